@@ -17,6 +17,7 @@ LAYOUT = "<8" + " >8" * 3 + " >6" * 3 + "  <12"  # behind the session's name
 WIDTH, LEAST_LABEL, MOST_SINCE = 100, 12, 17  # columns
 DECIMALS = {"deg": 4, "m": 3}  # 0.0001° is 0.05 mm at 30 m
 MOST_NAMED = 3  # stages; of more than these the table shows the first and the last
+UP_TO_DATE = "up to date"
 BAD = {REJECTED: "rejected", COULD_NOT_RUN: "refused", BUG: "bug"}
 COUNTED = {ACCEPTED: "accepted", REJECTED: "rejected", COULD_NOT_RUN: "could not run", BUG: "ended by a bug"}
 
@@ -38,7 +39,7 @@ class Outcome:
         ran = ", ".join(answer.ran)
         if len(answer.ran) > MOST_NAMED:
             ran = f"{answer.ran[0]} to {answer.ran[-1]}"
-        return "; ".join([f"ran {ran}" if ran else "up to date", *(f"{kind} not drawn" for kind in answer.not_drawn)])
+        return "; ".join([f"ran {ran}" if ran else UP_TO_DATE, *(f"{kind} not drawn" for kind in answer.not_drawn)])
 
     @property
     def verdict(self) -> str:
@@ -59,6 +60,8 @@ class Outcome:
     def line(self) -> str:
         """The line about the end of the session."""
         words = self.complaint or f"{self.session.label}: {self.answer.verdict}"
+        if self.done == UP_TO_DATE:
+            return f"{words}; up to date ({self.seconds:.1f} s)"  # one sentence, for the translation
         done = f"; {self.done}" if self.answer.status in (ACCEPTED, REJECTED) else ""
         return f"{words}{done} ({self.seconds:.1f} s)"
 
@@ -117,5 +120,5 @@ def count_line(outcomes: Sequence[Outcome]) -> str:
     numbers = {words: sum(one.answer.status == status for one in outcomes) for status, words in COUNTED.items()}
     parts = ", ".join(f"{number} {words}" for words, number in numbers.items() if number)
     same = sum(one.answer.status in (ACCEPTED, REJECTED) and not one.answer.ran for one in outcomes)
-    unchanged = f"; {same} up to date" if same else ""
-    return f"{plural(len(outcomes), 'session')}: {parts}{unchanged}."
+    whole = f"{plural(len(outcomes), 'session')}: {parts}"
+    return f"{whole}; {same} up to date." if same else f"{whole}."
