@@ -43,6 +43,7 @@ from pipeline.results.pages.plots import picture_names
 from pipeline.results.pages.rendering import render_page
 from pipeline.results.pages.sigma_sources import sigma_source_rows, slot_checks
 from pipeline.run import manifest
+from pipeline.run.origins import DEFAULT, POOL, SESSION, origin_of
 from pipeline.run.results import PAGE, Tables, agreeing, calibration
 from pipeline.run.settings import Settings, read_settings
 from pipeline.target.design import target_of
@@ -99,7 +100,7 @@ def report_page(tables: Tables, manifests: Mapping[str, manifest.Manifest], pict
         laser=settings.session.calibrated == "laser",
         **_result_values(tables, manifests, result, settings),
         **_residual_values(tables, result, settings),
-        **_data_values(tables, manifests, settings),
+        **_data_values(tables, manifests, result, settings),
         drawn_from=page_digest(tables.run, manifests),
         pictures=dict(zip(picture_names(tables.run), pictures, strict=True)),
     )
@@ -158,7 +159,9 @@ def _residual_values(tables: Tables, result: Row, settings: Settings) -> Row:
     }
 
 
-def _data_values(tables: Tables, manifests: Mapping[str, manifest.Manifest], settings: Settings) -> Row:
+def _data_values(
+    tables: Tables, manifests: Mapping[str, manifest.Manifest], result: Row, settings: Settings
+) -> Row:
     """Return the template's values about passes, files, counts, settings and provenance."""
     gaps = tables.table(GAPS).sort_values("duration_s", ascending=False)
     counts = [row | {"stage": stage} for stage, of_stage in manifests.items() for row in of_stage.counts]
@@ -168,7 +171,7 @@ def _data_values(tables: Tables, manifests: Mapping[str, manifest.Manifest], set
         "gaps": gaps.head(MOST_GAPS).to_dict("records"),
         "more_gaps": max(0, len(gaps) - MOST_GAPS),
         "counts": [row for row in counts if row["count"]],
-        "figures": instrument_rows(settings.session),
+        "figures": instrument_rows(settings, result["ins_drift"]),
         "changed": _changed(settings),
         "commit": manifests["report"].git_commit,
         "utc": lambda t_ns: utc_text(int(t_ns))[:19].replace("T", " "),
@@ -198,9 +201,28 @@ def _changed(settings: Settings) -> list[dict[str, str]]:
         return value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
 
     rows = [
-        {"where": where, "key": key, "default": "" if default is None else shown(default), "value": shown(value)}
-        for where, model in (("pool", settings.pool), ("session", settings.session))
+        {
+            "origin": _origin(settings, key),
+            "key": key,
+            "default": "" if default is None else shown(default),
+            "value": shown(value),
+        }
+        for model in (settings.pool, settings.session)
         for key, default, value in changed_settings(model)
         if ".instrument." not in key and not key.startswith("about.")  # these stand elsewhere on the page
     ]
     return sorted(rows, key=lambda row: not row["default"])
+
+
+def _origin(settings: Settings, key: str) -> str:
+    """Return where a value that is not the default comes from; the program sets some, such as those of a cast's file.
+
+    A list of blocks, or a block whose keys are free names, is given as a whole.
+    """
+    origin = origin_of(settings, key)
+    if origin != DEFAULT:
+        return origin
+    stated = [one for keys in settings.stated.values() for one in keys]
+    given = any(one.startswith(f"{key}.") or key.startswith(f"{one}.") for one in stated)
+    file = SESSION if key.partition(".")[0] in type(settings.session).model_fields else POOL
+    return file if given else "set by poolcal"
