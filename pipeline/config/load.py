@@ -22,7 +22,7 @@ def load_pool(path: Path) -> PoolConfig:
     content = content_of(text, path)
     if "target" not in content and {"ins", "laser"} & content.keys():
         raise ConfigError(f"{path}: is a session's file; --config wants the pool's, which says where the target is")
-    refuse_unfilled(text, path)
+    refuse_unfilled({path: text})
     return parse(PoolConfig, with_mesh(content, path), str(path))
 
 

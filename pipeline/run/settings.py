@@ -9,12 +9,13 @@ import yaml
 
 from pipeline.atomic_files import sha256, write_text
 from pipeline.config.about import About
-from pipeline.config.load import load_pool, load_session, stated_keys
+from pipeline.config.fill_in import refuse_unfilled
+from pipeline.config.load import load_pool, load_session, session_yaml, stated_keys
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import Calibrated, Mbes, SessionConfig
 from pipeline.config.stage_settings import settings_by_name
 from pipeline.config.target import Target
-from pipeline.config.yaml_file import SESSION_YAML, read_yaml
+from pipeline.config.yaml_file import SESSION_YAML, read_yaml, text_of
 from pipeline.config.yaml_models import parse
 from pipeline.errors import ArtefactError, ConfigError
 from pipeline.readers.casts import with_cast
@@ -68,6 +69,8 @@ def load_settings(session_folder: Path, config_path: Path, calibrated: Calibrate
         "mbes": the sonar. "laser": the laser; a sonar in the session is ignored. None: the sonar if the session has
         one, otherwise the laser.
     """
+    if config_path.is_file():
+        refuse_unfilled({path: text_of(path) for path in (session_yaml(session_folder), config_path)})
     pool = load_pool(config_path)
     try:
         target_of(pool.target)

@@ -29,15 +29,18 @@ from pipeline.config.changes import changed_settings
 from pipeline.config.target import Letters
 from pipeline.gps_time import utc_text
 from pipeline.maths.mount_parameters import PARAMETERS
+from pipeline.maths.target.family_words import families_in_words
 from pipeline.report.as_built import design_shape
 from pipeline.report.reason_codes import verdict_in_words
 from pipeline.report.sigma_sources import contributions, laser_correlates
 from pipeline.results.pages.certificate import certificate_values
 from pipeline.results.pages.currency import page_digest
+from pipeline.results.pages.drift_words import drift_rows, drift_sentence
 from pipeline.results.pages.instrument_table import instrument_rows
 from pipeline.results.pages.limiting_errors import limiting_sentences
 from pipeline.results.pages.mount_tables import METHODS, correlation_rows, method_rows, parameter_rows, part_rows
 from pipeline.results.pages.parameter_tests import parameter_test_rows, untold_parameters
+from pipeline.results.pages.patent_check import patent_check
 from pipeline.results.pages.plane_tables import as_built_rows, plane_agreement_rows
 from pipeline.results.pages.plots import picture_names
 from pipeline.results.pages.rendering import render_page
@@ -133,6 +136,8 @@ def _result_values(
         "speeds": _speeds(tables.table(FILES)),
         "letters": isinstance(settings.pool.target, Letters),
         "solved_methods": [method for method in methods if result["methods"][method]["mount"]],
+        "patent_check": "" if laser else patent_check(result["methods"]),
+        "faces_in_words": families_in_words(target_of(settings.pool.target)),
         "by_method": [] if laser else list(method_rows(calibrations)),
         "planes": planes,
         "several_planes": list(dict.fromkeys(row["plane"] for row in planes if np.isnan(row["angle_deg"]))),
@@ -154,7 +159,8 @@ def _residual_values(tables: Tables, result: Row, settings: Settings) -> Row:
         "untold": untold_parameters(tables.table(FREED)),
         "parameter_tests": list(parameter_test_rows(tables.table(FREED), settings.pool.adjust.test_level)),
         "groups": tables.table(GROUPS).to_dict("records"),
-        "drift_figures": [row for row in tables.table(DRIFT_FIGURES).to_dict("records") if row["sigma_log"]],
+        "drift_figures": drift_rows(tables.table(DRIFT_FIGURES)),
+        "drift_in_words": drift_sentence(tables.table(DRIFT_FIGURES)),
         "summary": tables.table(ADJUST_SUMMARY).to_dict("records")[0],
     }
 
