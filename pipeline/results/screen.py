@@ -84,8 +84,10 @@ def _pass_lines(passes: Sequence[Mapping[str, Any]], sensor: str) -> list[str]:
         if row["soundings"] or row["laser_points"]:
             counts = f"{row['soundings']} + {row['laser_points']}" if is_sonar else f"{row['laser_points']}"
             listed.append(f"{row['pass']}: {row['distance_m']:.1f} m {counts}")
-    wrapped = textwrap.wrap(", ".join(listed), SCREEN, initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False)
-    return [f"Points on the target by pass, distance of the INS from the wall, {points}:", *wrapped]
+    lines = textwrap.wrap(
+        ", ".join(listed), SCREEN, initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False
+    )
+    return [f"Points on the target by pass, distance of the INS from the wall, {points}:", *lines]
 
 
 def _target_line(target: Mapping[str, Any]) -> str:

@@ -1,8 +1,17 @@
 """The note that nobody stated how the INS drifts: neither session.yaml, nor its preset, nor the INS's log."""
 
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
 from pipeline.config.session import Drift
 from pipeline.run.origins import is_assumed
-from pipeline.run.settings import Settings
+from pipeline.run.settings import Settings, read_settings
+
+
+def note_of_run(run: Path, result: Mapping[str, Any]) -> str:
+    """Return the note on a run's drift; ``result``: the content of its calibration.json."""
+    return assumed_drift(read_settings(run), bool(result["ins_drift"]["from_files"]))
 
 
 def assumed_drift(settings: Settings, from_files: bool) -> str:
@@ -19,7 +28,7 @@ def assumed_drift(settings: Settings, from_files: bool) -> str:
         return ""
     drift = settings.session.ins.drift
     return (
-        f"the INS's log holds no accuracies, and session.yaml states no ins.drift, so its drift is assumed: "
+        "the INS's log holds no accuracies, and session.yaml states no ins.drift, so its drift is assumed: "
         f"{drift.horizontal_m:g} m horizontal, {drift.vertical_m:g} m vertical, {drift.roll_pitch_deg:g}° in roll and "
         f"pitch, {drift.heading_deg:g}° in heading, time constant {drift.time_constant_s:g} s"
     )

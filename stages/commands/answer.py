@@ -21,13 +21,12 @@ def print_answer(text: str, is_yes: bool, as_is: bool = False) -> int:
 def print_result(run: Path) -> int:
     """Print the result of a run, with a note on an assumed drift, and return the exit status: 1 if it was rejected."""
     from pipeline.results.screen import summary
-    from pipeline.run.assumed_drift import assumed_drift
+    from pipeline.run.assumed_drift import note_of_run
     from pipeline.run.results import calibration
-    from pipeline.run.settings import read_settings
     from pipeline.text_table import wrapped
 
     result = calibration(run)
-    note = assumed_drift(read_settings(run), bool(result["ins_drift"]["from_files"]))
+    note = note_of_run(run, result)
     lines = [summary(result), *(wrapped(f"Note: {note}.") if note else ())]
     return print_answer("\n".join(lines), result["verdict"] == "accepted")
 
@@ -44,7 +43,7 @@ def say_where(run: Path) -> None:
 def say_next(run: Path) -> None:
     """Print what comes after an accepted calibration of the sonar: entering its values, and proving that."""
     lines = [
-        "Next: enter the values in your survey software (poolcal export --list shows all), and prove that they are right:",
+        "Next: enter the values in your survey software (poolcal export --list shows all), and prove that:",
         f"  {_command('export', run)} --to NAME",
         f"  {_command('check-entry', run)} SOUNDINGS",
     ]

@@ -195,8 +195,10 @@ def test_families_of_soundings_stand_in_their_order_with_their_share() -> None:
     many = np.full(len(model.faces), 1000.0)
     counts = expected_soundings.SoundingCounts(many, 0.8 * many)
     lines = rendering._soundings_lines(SessionCheck((), (), (), model, counts))
-    assert [line.split()[0] for line in lines[2:]] == ["P1", "P2", "P3", "H"]
-    assert all(line.endswith("80%") for line in lines[2:])
+    assert [line.split()[0] for line in lines[2:6]] == ["P1", "P2", "P3", "H"]
+    assert all(line.endswith("80%") for line in lines[2:6])
+    assert lines[6].startswith("~: estimated")
+    assert lines[7].startswith("Faces, as seen from the passing boat: P1: ")
 
 
 def test_a_latency_is_told_as_an_interval() -> None:

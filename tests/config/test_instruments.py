@@ -19,37 +19,11 @@ from pipeline.config.yaml_models import parse
 from pipeline.errors import ConfigError
 from pipeline.planning import assessment
 from pipeline.report.calibration_document import instruments_block
-from pipeline.results.pages.instrument_table import instrument_rows
-from pipeline.results.pages.rendering import render_page
 from pipeline.run.settings import Settings, read_settings, write_settings
-from tests.support.pages import Page
+from tests.support.preset_sessions import FOREIGN, MOUNT, content, session, write
 
 FILES = sorted(PRESETS.glob("*.yaml"))
-MOUNT = {"roll_deg": 0.0, "pitch_deg": 0.0, "yaw_deg": 0.0, "x_m": 0.0, "y_m": 0.0, "z_m": -1.0}
 LEAF = re.compile(r"^( *)(\w+): *([^#]*?) *(?:# (.*))?$")
-FOREIGN = "<b>\"O'Brien\" & sons</b>"
-
-
-def content(**blocks: dict[str, Any]) -> dict[str, Any]:
-    """session.yaml; ``blocks``: more keys of a sensor."""
-    plain: dict[str, dict[str, Any]] = {
-        "ins": {"files": ["ins/*"], "format": "novatel"},
-        "laser": {"files": ["laser/*"], "format": "las", "mount": MOUNT},
-        "mbes": {"files": ["mbes/*"], "format": "r2sonic", "mount": MOUNT},
-    }
-    return {sensor: block | blocks.get(sensor, {}) for sensor, block in plain.items()}
-
-
-def write(path: Path, values: dict[str, Any]) -> None:
-    path.write_text(yaml.safe_dump(json.loads(json.dumps(values))), encoding="utf-8")  # copied: aliases are refused
-
-
-def session(folder: Path, presets: dict[str, Any] | None = None, **blocks: dict[str, Any]) -> SessionConfig:
-    (folder / "instruments").mkdir(exist_ok=True)
-    for name, preset in (presets or {}).items():
-        write(folder / "instruments" / f"{name}.yaml", preset)
-    write(folder / "session.yaml", content(**blocks))
-    return load_session(folder)
 
 
 def refused(folder: Path, presets: dict[str, Any] | None = None, **blocks: dict[str, Any]) -> str:
@@ -249,35 +223,3 @@ def test_calibration_json_names_them(tmp_path: Path) -> None:
     assert json.loads(json.dumps(shown)) == shown
     plain = session(tmp_path)
     assert instruments_block({"ins": plain.ins, "laser": plain.laser, "mbes": plain.mbes}) == {}
-
-
-def test_the_report_says_which_figure_comes_from_where(tmp_path: Path) -> None:
-    preset = {
-        "title": FOREIGN,
-        "sensor": "mbes",
-        "settings": {"range_sigma_m": 0.02, "angle_sigma_deg": 0.07, "beam_deg": [0.4, 1.5]},
-        "unverified": ["range_sigma_m", "angle_sigma_deg"],
-    }
-    mbes = {"instrument": "mine", "angle_sigma_deg": 0.09}
-    found = session(tmp_path, {"mine": preset}, mbes=mbes, laser={"range_sigma_m": 0.006})
-    html = render_page("instrument_table.html", figures=instrument_rows(found))
-    shown = Page(html).table("sensor", "instrument", "figure")
-    assert [row for row in shown if row[0]] == [
-        ["ins", "–", "drift.horizontal_m", "0.015", "default"],
-        ["laser", "–", "range_sigma_m", "0.006", "session"],
-        ["mbes", FOREIGN, "range_sigma_m", "0.02", "preset, unverified"],
-    ]
-    assert shown[-10:] == [
-        ["", "", "range_bias_sigma_m", "0.005", "default"],
-        ["", "", "incidence_bias_sigma_m", "0.003", "default"],
-        ["", "", "level_bias_sigma_m", "0.01", "default"],
-        ["", "", "angle_sigma_deg", "0.09", "session"],
-        ["", "", "beam_deg", "0.4, 1.5", "preset"],
-        ["", "", "frequency_hz", "400000", "default"],
-        ["", "", "aperture_m", "–", "default"],
-        ["", "", "focused", "yes, no", "default"],
-        ["", "", "projector_offset_m", "–", "default"],
-        ["", "", "projector_sigma_m", "0.005", "default"],
-    ]
-    assert len(shown) == 23
-    assert "<b>\"O'Brien" not in html

@@ -136,7 +136,11 @@ def test_rejected_by_the_limits(done: Place, result: dict[str, Any]) -> None:
     assert rejected["reason_codes"] == ["sigma_above_limit"] * 3
     for reason, axis in zip(rejected["reasons"], ("roll", "pitch", "yaw"), strict=True):
         assert axis in reason
-        assert f"  because {reason}\n" in told.out
+        assert f" because {reason} " in " ".join(told.out.split())
+    assert max(map(len, told.out.splitlines())) <= 100
+    assert "Do not use these values." in told.out
+    for words in ("Use the total sigma", "Next: ", "poolcal export"):
+        assert words not in told.out
     assert rejected["mbes"] == result["mbes"]
     assert yaml.safe_load((done.run / "report" / "calibration.yaml").read_text("utf-8")) == rejected
     assert done.calibrate().status == 1  # with nothing to do the answer stays no

@@ -56,8 +56,8 @@ OTHERS: list[tuple[Callable[[], Iterable[Statement]], ReasonCode, str]] = [
     (
         lambda: judged(evidence(mount={"within": False, "rotation_z_deg": -1.6}), OF_LASER),
         ReasonCode.MOUNT_BEYOND_SEARCH,
-        "no mount of the laser within 1.5° of the coarse one brings its points onto the target; best fits +4.40° in "
-        "pitch, +4.40° in roll, -1.60° in yaw: laser.mount is farther off than segment.search_laser_deg allows, or",
+        "no mount of the laser within 1.5° of the coarse one (3 times segment.search_laser_deg) brings its points onto "
+        "the target; best fits +4.40° in pitch, +4.40° in roll, -1.60° in yaw: laser.mount is farther off than that",
     ),
     (
         lambda: rejections(

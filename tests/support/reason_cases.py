@@ -34,7 +34,8 @@ REASONS: list[tuple[dict[str, Any], ReasonCode, str]] = [  # evidence, code, wor
     (
         {"mount": {"within": False}},
         ReasonCode.MOUNT_BEYOND_SEARCH,
-        "no mount within 4.5° and 0.45 m of the coarse one brings the soundings onto the target: mbes.mount is farther",
+        "no mount within 4.5° and 0.45 m of the coarse one (1.5 times segment.search_mount_deg = 3 and "
+        "search_mount_m = 0.3) brings the soundings onto the target: mbes.mount is farther off than that",
     ),
     (
         {"mount": {"within": False, "rotation_z_deg": -4.6, "lever_arm_z_m": 0.6}},

@@ -19,6 +19,7 @@ import pandas as pd
 
 import pipeline.readers.dispatch
 import pipeline.results.screen
+import pipeline.run.assumed_drift
 import stages
 import stages.commands.draw
 from pipeline.artefacts.catalogue.results import CALIBRATION_JSON
@@ -76,12 +77,14 @@ def install(put: Callable[[object, str, object], object]) -> dict[str, types.Mod
         pipeline.results.screen, "summary",
         lambda calibration: f"{calibration['session']}: {calibration['verdict']}",
     )  # fmt: skip
+    put(pipeline.run.assumed_drift, "note_of_run", lambda *_: "")  # nor an INS
     take, sift, _ = toys.stages()
     take.__name__, sift.__name__ = "stages.take", "stages.sift"
     put(stages, "ORDER", ("take", "sift", "report"))
     put(pipeline.readers.dispatch, "raw_files", toys.raw_files)
     put(pipeline.readers.dispatch, "raw_parts", toys.raw_parts)
     repeat = importlib.import_module("stages.commands.repeat")  # not before the toys are in their places
+    put(importlib.import_module("stages.commands.run"), "say_next", lambda _: None)  # toys have no values to enter
     put(repeat, "WORKER", [sys.executable, __file__, REPEAT_WORKER])
     return {module.__name__: module for module in (take, sift, report)}
 

@@ -1,4 +1,4 @@
-"""What the names of a target's families stand for, in one sentence, from the faces themselves: for any kind of target."""
+"""What the names of a target's families stand for, in one sentence, from the faces themselves: for any target."""
 
 import numpy as np
 

@@ -35,6 +35,6 @@ def patent_check(methods: Mapping[str, Mapping[str, Any]]) -> str:
     if ratios[worst] <= MOST_SIGMAS:
         return f"{here}: the check holds."
     return (
-        f"{here}, more than {MOST_SIGMAS:g}: the check does not hold. Look at the residuals and at the agreement of the "
-        "planes, and do not use the values before you know why."
+        f"{here}, more than {MOST_SIGMAS:g}: the check does not hold. Look at the residuals and at the agreement of "
+        "the planes, and do not use the values before you know why."
     )

@@ -1,0 +1,121 @@
+"""Where a run's figures come from: the files' own keys, a preset, the INS's files, or nobody."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from pipeline.config.instruments import PRESETS
+from pipeline.config.load import load_pool, stated_keys
+from pipeline.config.session import SessionConfig
+from pipeline.results.pages.assumptions import assumed_groups
+from pipeline.results.pages.instrument_table import instrument_rows
+from pipeline.results.pages.rendering import render_page
+from pipeline.run.assumed_drift import assumed_drift
+from pipeline.run.origins import is_recorded
+from pipeline.run.settings import Settings, read_settings, write_settings
+from tests.support.pages import Page
+from tests.support.preset_sessions import FOREIGN, session
+
+
+def _settings(folder: Path, found: SessionConfig) -> Settings:
+    """The session with the demo's pool, as poolcal run has them: with the keys that the files state."""
+    pool = PRESETS.parent / "defaults.yaml"
+    stated = {"session": stated_keys(folder / "session.yaml"), "config": stated_keys(pool)}
+    return Settings(folder, load_pool(pool), found, {}, stated)
+
+
+def _shown(settings: Settings, from_files: tuple[str, ...] = ()) -> list[list[str]]:
+    drift = settings.session.ins.drift.model_dump() | {"from_files": list(from_files)}
+    html = render_page("instrument_table.html", figures=instrument_rows(settings, drift))
+    assert "<b>\"O'Brien" not in html
+    return Page(html).table("sensor", "instrument", "figure")
+
+
+def test_the_report_says_which_figure_comes_from_where(tmp_path: Path) -> None:
+    """A value in session.yaml is the session's, be it the default or not, with a preset or without one."""
+    preset = {
+        "title": FOREIGN,
+        "sensor": "mbes",
+        "settings": {"range_sigma_m": 0.02, "angle_sigma_deg": 0.07, "beam_deg": [0.4, 1.5]},
+        "unverified": ["range_sigma_m", "angle_sigma_deg"],
+    }
+    mbes = {"instrument": "mine", "angle_sigma_deg": 0.06, "latency_sigma_s": 0.0005}  # 0.0005: as the default
+    laser = {"range_sigma_m": 0.005}  # as the default
+    found = session(tmp_path, {"mine": preset}, mbes=mbes, laser=laser, ins={"white": {"position_m": 0.002}})
+    shown = _shown(_settings(tmp_path, found))
+    assert [row[:2] for row in shown if row[0]] == [["ins", "–"], ["laser", "–"], ["mbes", FOREIGN], ["target", "–"]]
+    told: dict[str, dict[str, tuple[str, str]]] = {}
+    for sensor, _, key, value, origin in shown:
+        told.setdefault(sensor or [*told][-1], {})[key] = (value, origin)
+    assert told["ins"]["drift.horizontal_m"] == ("0.015", "default")
+    assert told["ins"]["drift_within.time_constant"] == ("3", "default")
+    assert told["ins"]["white.position_m"] == ("0.002", "session")
+    assert told["ins"]["white.attitude_deg"] == ("0.002", "default")
+    assert told["laser"]["range_sigma_m"] == ("0.005", "session")
+    assert told["laser"]["angle_sigma_deg"] == ("0.003", "default")
+    assert told["laser"]["mount_sigma.angle_deg"] == ("0.005", "default")
+    assert told["laser"]["latency_sigma_s"] == ("0.0002", "default")
+    assert told["mbes"]["range_sigma_m"] == ("0.02", "preset (mine), unverified")
+    assert told["mbes"]["angle_sigma_deg"] == ("0.06", "session")
+    assert told["mbes"]["beam_deg"] == ("0.4, 1.5", "preset (mine)")
+    assert told["mbes"]["focused"] == ("yes, no", "default")
+    assert told["mbes"]["sound_speed_gradient_sigma_1_s"] == ("0.1", "default")
+    assert told["mbes"]["latency_sigma_s"] == ("0.0005", "session")
+    assert "svp_sigma_m_s" not in told["mbes"]  # without a cast it has no part
+    assert told["target"]["as_built.face_sigma_m"][0] == "0.0005"
+
+
+def test_sigmas_of_the_ins_s_files_are_told_to_be_theirs(tmp_path: Path) -> None:
+    shown = _shown(_settings(tmp_path, session(tmp_path)), ("horizontal_m",))
+    origins = {row[2]: row[4] for row in shown}
+    assert (origins["drift.horizontal_m"], origins["drift.vertical_m"]) == ("the INS's files", "default")
+
+
+def test_an_older_run_does_not_claim_to_know(tmp_path: Path) -> None:
+    """Its run.yaml has no stated keys: a value that is the default may be the session's."""
+    found = session(tmp_path, laser={"range_sigma_m": 0.006})
+    older = replace(_settings(tmp_path, found), stated={})
+    origins = {row[2]: row[4] for row in _shown(older)[9:]}
+    assert origins["angle_sigma_deg"] == "default, or the same in the file"
+    assert [row[4] for row in _shown(older) if row[3] == "0.006"] == ["session"]
+    assert list(assumed_groups(older, False)) == []
+    assert not is_recorded(older)
+
+
+def test_the_certificate_names_what_nobody_stated(tmp_path: Path) -> None:
+    groups = " | ".join(assumed_groups(_settings(tmp_path, session(tmp_path)), False))
+    assert "slow errors of the INS (horizontal 15 mm, vertical 20 mm, roll and pitch 0.01°" in groups
+    assert "the laser's own mount (angles 0.005°, lever arm 1.5 mm)" in groups
+    assert "clocks (of the laser 0.2 ms, of the sonar 0.5 ms)" in groups
+    assert "sound speed (0.2 m/s, 0.1 m/s per metre of depth)" in groups
+    stated = {"mount_sigma": {"angle_deg": 0.005}, "latency_sigma_s": 0.0002}
+    found = session(tmp_path, laser=stated, ins={"drift": {"heading_deg": 0.03}})
+    groups = " | ".join(assumed_groups(_settings(tmp_path, found), False))
+    assert "the laser's own mount (lever arm 1.5 mm)" in groups
+    assert "clocks (of the sonar 0.5 ms)" in groups
+    assert "heading" not in groups
+    of_files = " | ".join(assumed_groups(_settings(tmp_path, session(tmp_path)), True))
+    assert "slow errors of the INS (time constant 200 s)" in of_files
+
+
+def test_the_note_on_the_drift_is_there_only_where_nobody_stated_it(tmp_path: Path) -> None:
+    plain = _settings(tmp_path, session(tmp_path))
+    assert "its drift is assumed: 0.015 m horizontal, 0.02 m vertical, 0.01°" in assumed_drift(plain, False)
+    assert assumed_drift(plain, True) == ""
+    assert assumed_drift(replace(plain, stated={}), False) == ""
+    given = _settings(tmp_path, session(tmp_path, ins={"drift": {"heading_deg": 0.03}}))
+    assert assumed_drift(given, False) == ""
+    ins = {"title": "I", "sensor": "ins", "settings": {"drift": {"heading_deg": 0.03}}}
+    assert assumed_drift(_settings(tmp_path, session(tmp_path, {"mine": ins}, ins={"instrument": "mine"})), False) == ""
+
+
+def test_the_stated_keys_are_kept_in_run_yaml(tmp_path: Path) -> None:
+    found = session(tmp_path, laser={"range_sigma_m": 0.005})
+    settings = _settings(tmp_path, found)
+    assert "laser.range_sigma_m" in settings.stated["session"]
+    assert not {"laser", "laser.mount", "laser.angle_sigma_deg"} & {*settings.stated["session"]}
+    (tmp_path / "run").mkdir()
+    write_settings(tmp_path / "run", settings)
+    again = read_settings(tmp_path / "run")
+    assert {name: list(keys) for name, keys in again.stated.items()} == {
+        name: list(keys) for name, keys in settings.stated.items()
+    }
