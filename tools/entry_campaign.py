@@ -18,7 +18,6 @@ import numpy as np
 from pyproj import CRS
 
 from pipeline.entry_check.check import EntryCheck, check_entry
-from pipeline.entry_check.words import verdict_of
 from pipeline.errors import PoolcalError
 from pipeline.results.finished_run import FinishedRun
 from stages import ORDER
@@ -138,7 +137,7 @@ def exported(folder: Path, recorded: Recording, case: Planted) -> tuple[Path, st
 def named(check: EntryCheck) -> str:
     """Return the answer with its codes."""
     codes = [" + ".join(sorted({*one.keys} - {"right", "plain"})) for one in check.answer.explanations]
-    return f"{verdict_of(check.answer)} {' | '.join(codes)}".strip()
+    return f"{check.answer.verdict} {' | '.join(codes)}".strip()
 
 
 def row(run: FinishedRun, recorded: Recording, case: Planted) -> tuple[str, str, bool]:
