@@ -96,9 +96,7 @@ def _ways(pairs: Pairs, source: EntrySource, words: tuple[str, ...], cost: float
         yield way("sound_speed", said, longer, OWN + EACH_VALUE)
     late = fit_mount(soundings, points, freed(*base, "delay"))
     if abs(late.delay_s) >= LEAST_DELAY_S and _is_significant(late, "delay"):
-        said = (
-            f"the software's poses are {late.delay_s:+.4f} s late: it has another time base, or a latency"
-        )
+        said = f"the software's poses are {late.delay_s:+.4f} s late: it has another time base, or a latency"
         yield way("delay", said, late, OWN + EACH_VALUE)
     moved = fit_mount(soundings, points, freed("shift_x", "shift_y", Z))
     said, values = _shift_words(_shift_at(pairs, moved, source), source, any_height)
