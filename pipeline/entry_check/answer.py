@@ -1,8 +1,8 @@
 """The answer of a check: what was entered, with its uncertainty, and which mistakes explain it.
 
 The mount is fitted in several ways to place soundings (:mod:`pipeline.entry_check.ways`). A way stays in question if
-its scatter is as good as the best. In each way the fitted rotation and lever arm are compared with every :class:`Entered`
-value: it explains what was found if they differ by no more than a tolerance, three sigmas, and what the scatter beyond
+its scatter is as good as the best. In each way the fitted rotation and lever arm are compared with every
+:class:`Entered` value: it explains what was found if they differ by no more than a tolerance, three sigmas, and what the scatter beyond
 rounding may hide. Of all explanations those of the least cost are the answer: one for each mistake, a little more for
 each value that may take any size, such as a shift. So a mistake with known numbers goes before one that fits anything.
 
@@ -219,9 +219,9 @@ def _explanations(judge: Judge, source: EntrySource) -> Iterator[Explanation]:
             parts = tuple(f"{'angles' if one is angle else 'lever arm'}: {one.words}" for one in wrong)
             cost = way.cost + sum(one.mistakes for one in wrong)
             yield Explanation((angle.key, arm.key, way.key), (*way.words, *parts), cost)
+    if not (angles and arms):
+        yield from _unknown(judge, source, _fewest(angles), _fewest(arms))
     if way.key in (PLAIN, "heights"):
-        if not (angles and arms):
-            yield from _unknown(judge, source, _fewest(angles), _fewest(arms))
         yield from _attitudes(judge, source)
 
 

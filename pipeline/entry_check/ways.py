@@ -94,7 +94,7 @@ def _ways(pairs: Pairs, source: EntrySource, words: tuple[str, ...], cost: float
         percent = 100 * (longer.range_factor - 1)
         said = f"the software's ranges are {percent:+.2f} % longer than the run's: it works with another sound speed"
         yield way("sound_speed", said, longer, OWN + EACH_VALUE)
-    late = fit_mount(soundings, points, freed(*base, "delay"))
+    late = fit_mount(soundings, points, freed(*base, "delay"), pairs.delay_s)
     if abs(late.delay_s) >= LEAST_DELAY_S and _is_significant(late, "delay"):
         said = f"the software's poses are {late.delay_s:+.4f} s late: it has another time base, or a latency"
         yield way("delay", said, late, OWN + EACH_VALUE)
@@ -125,10 +125,8 @@ def _shift_words(shift_m: Array, source: EntrySource, any_height: bool) -> tuple
     counted = shift_m[:2] if any_height else shift_m
     parts = [f"{east:+.3f} m east, {north:+.3f} m north"] + [f"{up:+.3f} m up"] * (not any_height)
     values = int((np.abs(counted) > LEAST_SHIFT_M).sum())
-    return (
-        f"all soundings are shifted by {', '.join(parts)}: another datum or epoch, grid offsets, or other positions",
-        values,
-    )
+    words = f"all soundings are shifted by {', '.join(parts)}: another datum or epoch, grid offsets, or other positions"
+    return words, values if np.abs(shift_m[:2]).max() > LEAST_SHIFT_M else 0
 
 
 def _delays(source: EntrySource) -> Iterator[tuple[str, str, float]]:
