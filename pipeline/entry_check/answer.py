@@ -2,9 +2,10 @@
 
 The mount is fitted in several ways to place soundings (:mod:`pipeline.entry_check.ways`). A way stays in question if
 its scatter is as good as the best. In each way the fitted rotation and lever arm are compared with every
-:class:`Entered` value: it explains what was found if they differ by no more than a tolerance, three sigmas, and what the scatter beyond
-rounding may hide. Of all explanations those of the least cost are the answer: one for each mistake, a little more for
-each value that may take any size, such as a shift. So a mistake with known numbers goes before one that fits anything.
+:class:`Entered` value: it explains what was found if they differ by no more than a tolerance, three sigmas, and what
+the scatter beyond rounding may hide. Of all explanations those of the least cost are the answer: one for each mistake,
+a little more for each value that may take any size, such as a shift. So a mistake with known numbers goes before one
+that fits anything.
 
 "Entered rightly" needs more: the difference within the tolerance, and three sigmas of it too.
 """

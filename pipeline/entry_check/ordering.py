@@ -1,8 +1,8 @@
 """Pairs by the order of a file: windows that follow each other as in the run, and from them whole pings.
 
 Exported files keep the order of time. Windows that look alike by chance do not: of n of them about 2 √n stand in order
-(the longest increasing subsequence of a random permutation). So where half of many windows do, their pairs are right,
-whatever poses the software had.
+(the longest increasing subsequence of a random permutation; Logan and Shepp 1977). So where twice as many do, and not
+few, these are right, whatever poses the software had.
 """
 
 from bisect import bisect_left
@@ -15,7 +15,7 @@ from pipeline.entry_check.run_soundings import RunSoundings
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-LEAST_ORDERED, ORDERED_SHARE = 30, 0.5
+LEAST_ORDERED, ORDERED = 30, 4.0  # windows in order; of the root of all
 STRETCH = 0.003  # other rays and another sound speed change distances by this share
 
 
@@ -45,7 +45,7 @@ def in_order(windows: Windows) -> Windows | None:
     windows = windows.some(np.argsort(windows.file_rows[:, 0], kind="stable"))
     first = windows.run_rows[:, 0]
     best = max((longest_rise(values) for values in (first, -first)), key=len)
-    return windows.some(best) if len(best) >= max(LEAST_ORDERED, ORDERED_SHARE * len(first)) else None
+    return windows.some(best) if len(best) >= max(LEAST_ORDERED, ORDERED * np.sqrt(len(first))) else None
 
 
 def longest_rise(values: Integers) -> Integers:
@@ -68,8 +68,8 @@ def longest_rise(values: Integers) -> Integers:
 def whole_pings(windows: Windows, soundings: RunSoundings, points_m: Array, rows: Integers, limit_m: float) -> Integers:
     """Return pairs (2, m) of all beams of the windows' pings: numbers of soundings, numbers of points.
 
-    From a window on, each beam stands one row further in the file, as long as none was taken out. A pair counts if it is
-    as far from the window's two ends on both sides.
+    From a window on, each beam stands one row further in the file, as long as none was taken out. A pair counts if it
+    is as far from the window's two ends on both sides.
 
     Parameters
     ----------
