@@ -157,11 +157,7 @@ def answer_of(pairs: Pairs, source: EntrySource, heights_differ: bool, rounding_
     rounding_m
         Half the step of the file's coordinates.
     """
-    ways = list(ways_of(pairs, source, heights_differ))
-    best = min(way.fitted.scatter_m for way in ways)
-    most = (1 + WORSE) * best**2 + WORSE_M**2 + WORSE_OF_EXCESS * _excess_m(best, rounding_m) ** 2
-    range_m = float(np.median(np.linalg.norm(pairs.soundings.points_mbes_m, axis=1)))
-    judges = [Judge.of(way, rounding_m, range_m) for way in ways if way.fitted.scatter_m**2 <= most]
+    judges = _in_question(pairs, source, heights_differ, rounding_m)
     found = [(one, judge) for judge in judges for one in _explanations(judge, source)]
     found = found or [(_unexplained(judges[0], source), judges[0])]
     least = min(one.cost for one, _ in found)
@@ -182,6 +178,20 @@ def answer_of(pairs: Pairs, source: EntrySource, heights_differ: bool, rounding_
         rotation_right=judge.is_rotation(R),
         lever_right=judge.is_lever(lever),
     )
+
+
+def _in_question(pairs: Pairs, source: EntrySource, heights_differ: bool, rounding_m: float) -> list[Judge]:
+    """Return the judges of the ways that are in question: the plain one alone where it leaves nothing to explain."""
+    range_m = float(np.median(np.linalg.norm(pairs.soundings.points_mbes_m, axis=1)))
+    judges: list[Judge] = []
+    for way in ways_of(pairs, source, heights_differ):
+        judges.append(Judge.of(way, rounding_m, range_m))
+        R, lever_arm_m = source.total.R_body_from_sensor, source.total.lever_arm_body_m
+        if way.key == PLAIN and not judges[0].excess_m and judges[0].proves(R, lever_arm_m):
+            return judges
+    best = min(judge.way.fitted.scatter_m for judge in judges)
+    most = (1 + WORSE) * best**2 + WORSE_M**2 + WORSE_OF_EXCESS * _excess_m(best, rounding_m) ** 2
+    return [judge for judge in judges if judge.way.fitted.scatter_m**2 <= most]
 
 
 def _verdict(explanations: Sequence[Explanation], is_proved: bool) -> str:

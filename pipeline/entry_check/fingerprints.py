@@ -30,6 +30,7 @@ CLOSE_M = 0.15  # a window that a trial explains; a height reference that is wro
 LEAST_WINDOWS = 8
 DELAYS_S = (0.0, 0.5, -0.5, 1.0, -1.0, 2.0, -2.0, 18.0, -18.0, 19.0, -19.0, 37.0, -37.0)  # GPS, UTC, TAI; whole seconds
 DELAY_TRIED = 1500  # soundings
+LEAST_WHOLE = 0.5  # of the beams of matched pings; another session over the same target has no whole pings alike
 LESS = 0.5  # a delay counts if it lessens the scatter so much
 
 
@@ -101,7 +102,9 @@ def _by_order(soundings: RunSoundings, file: FilePoints, windows: Windows) -> Ma
     if chain is None:
         return None
     limit_m = 0.004 + 2 * file.rounding_m
-    own, other = whole_pings(chain, soundings, file.points_m, file.row, limit_m)
+    (own, other), share = whole_pings(chain, soundings, file.points_m, file.row, limit_m)
+    if share < LEAST_WHOLE:
+        return None
     some = np.arange(0, len(own), max(1, len(own) // DELAY_TRIED))
     tried = [(_delayed(soundings.rows(own[some]), one.points_m[other[some]]), one) for one in _signs(file)]
     fitted, points = min(tried, key=lambda one: one[0].scatter_m)

@@ -34,6 +34,8 @@ NAMES = ("rx", "ry", "rz", "x", "y", "z", "shift_x", "shift_y", "shift_z", "k", 
 SIZE = len(NAMES)
 LOOSE_M = 1e3  # of the weak prior, against a millimetre of each point
 STEP_S = 0.005  # of the difference of poses
+SCAN_S = tuple(0.0025 * np.arange(-12, 13))
+SCANNED = 1000  # soundings
 
 
 def freed(*names: str) -> tuple[bool, ...]:
@@ -136,6 +138,21 @@ def fit_mount(
     return FittedMount(R, t, s, k, covariance, float(np.sqrt(variance)), weight, d)
 
 
+def fit_delay(soundings: RunSoundings, points_pool_m: Array, names: tuple[str, ...], delay_s: float) -> FittedMount:
+    """Return the mount with the delay of the software's poses; ``names``: what else is free, ``delay_s``: a start.
+
+    Poses have noise from record to record. So the scatter falls sharply within one record of the true delay alone, and
+    around it hardly: steps end anywhere there, and a scan finds it.
+    """
+    late = fit_mount(soundings, points_pool_m, freed(*names, "delay"), delay_s)
+    some = np.arange(0, len(points_pool_m), max(1, len(points_pool_m) // SCANNED))
+    thin, there = soundings.rows(some), points_pool_m[some]
+    near = [fit_mount(thin, there, freed(*names), late.delay_s + step) for step in SCAN_S]
+    best = min(near, key=lambda one: one.scatter_m)
+    again = fit_mount(soundings, points_pool_m, freed(*names, "delay"), best.delay_s)
+    return min((again, late), key=lambda one: one.scatter_m)
+
+
 def _by_delay(soundings: RunSoundings, points_pool_m: Array, delay_s: float) -> Array:
     """Return -∂b/∂d (n, 3): by so much does a later pose lessen what remains of b."""
     before, after = (soundings.later(delay_s + step).in_body(points_pool_m) for step in (-STEP_S, STEP_S))
@@ -165,6 +182,6 @@ def _covariance(design: Array, weight: Array, residual: Array, normal: Array, t_
     inverse = np.linalg.pinv(normal, rcond=1e-14, hermitian=True)
     covariance = inverse @ (sums.T @ sums) @ inverse * len(sums) / max(len(sums) - 1, 1)
     between = leave_one_out(design, weight, scores, normal, time_groups(t_ns))
-    least = np.maximum(np.diag(covariance), 1e-300)
+    least = np.maximum(np.diag(covariance), 1e-30)
     wider = np.sqrt(np.maximum(between / least, 1.0))
     return np.asarray(covariance * wider[:, None] * wider)

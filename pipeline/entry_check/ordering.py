@@ -65,8 +65,10 @@ def longest_rise(values: Integers) -> Integers:
     return np.array(found[::-1], dtype=np.int64)
 
 
-def whole_pings(windows: Windows, soundings: RunSoundings, points_m: Array, rows: Integers, limit_m: float) -> Integers:
-    """Return pairs (2, m) of all beams of the windows' pings: numbers of soundings, numbers of points.
+def whole_pings(
+    windows: Windows, soundings: RunSoundings, points_m: Array, rows: Integers, limit_m: float
+) -> tuple[Integers, float]:
+    """Return pairs (2, m) of all beams of the windows' pings, soundings and points; and which share of the tried is so.
 
     From a window on, each beam stands one row further in the file, as long as none was taken out. A pair counts if it
     is as far from the window's two ends on both sides.
@@ -98,5 +100,6 @@ def whole_pings(windows: Windows, soundings: RunSoundings, points_m: Array, rows
         there = np.linalg.norm(x[own] - x[end_own[window]], axis=1)
         here = np.linalg.norm(points_m[other] - points_m[end_other[window]], axis=1)
         good &= np.abs(there - here) <= limit_m + STRETCH * there
+    share = float(good.mean()) if len(good) else 0.0
     own, place = np.unique(own[good], return_index=True)
-    return np.stack([own, other[good][place]])
+    return np.stack([own, other[good][place]]), share

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.entry_check.identification import Pairs
-from pipeline.entry_check.mount_fit import NAMES, FittedMount, fit_mount, freed
+from pipeline.entry_check.mount_fit import NAMES, FittedMount, fit_delay, fit_mount, freed
 from pipeline.entry_check.run_soundings import EntrySource, RunSoundings
 from pipeline.maths.geometry.rotations import rotation_z
 
@@ -94,7 +94,7 @@ def _ways(pairs: Pairs, source: EntrySource, words: tuple[str, ...], cost: float
         percent = 100 * (longer.range_factor - 1)
         said = f"the software's ranges are {percent:+.2f} % longer than the run's: it works with another sound speed"
         yield way("sound_speed", said, longer, OWN + EACH_VALUE)
-    late = fit_mount(soundings, points, freed(*base, "delay"), pairs.delay_s)
+    late = fit_delay(soundings, points, base, pairs.delay_s)
     if abs(late.delay_s) >= LEAST_DELAY_S and _is_significant(late, "delay"):
         said = f"the software's poses are {late.delay_s:+.4f} s late: it has another time base, or a latency"
         yield way("delay", said, late, OWN + EACH_VALUE)
