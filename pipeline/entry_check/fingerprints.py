@@ -2,7 +2,7 @@
 
 All soundings of a ping are placed with one pose and one mount. So the distances between neighbouring beams are the same
 in the run and in the file, however wrong the mount, the CRS's origin or the height reference is. Noise makes them as
-individual as a fingerprint: 5 neighbours have 10 distances, 9 neighbours 36. Exported files keep the order of pings
+individual as a fingerprint: 5 neighbours have 10 distances, of 15 some are taken. Exported files keep the order of pings
 and beams; where a file holds every n-th beam alone, beams n apart are compared.
 
 Windows that follow each other as in the run are right, whatever poses the software had. Where the order tells nothing,
@@ -21,10 +21,10 @@ from pipeline.entry_check.run_soundings import RunSoundings
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-WINDOW, WIDE_WINDOW = 5, 9  # beams; the wide one where coordinates are rounded to more than COARSE_M
+WINDOW, WIDE_WINDOW = 5, 15  # beams; the wide one where coordinates are rounded to more than COARSE_M
 COARSE_M = 0.002
 LAGS = (1, 2, 3, 4)
-MOST_QUERIES, MOST_WIDE_QUERIES = 20_000, 10_000
+MOST_QUERIES, MOST_WIDE_QUERIES = 20_000, 4000
 TRIALS, DRAWN = 400, 3  # windows of a trial
 CLOSE_M = 0.15  # a window that a trial explains; a height reference that is wrong by 10 m tilts it by so much
 LEAST_WINDOWS = 8
@@ -160,7 +160,7 @@ def _alike(run: Array, file: Array, rounding_m: float) -> tuple[tuple[Integers, 
     2 mm, for other software may trace the rays a little differently.
     """
     tree = cKDTree(_distances(run))
-    limit = np.sqrt(run.shape[1] * (run.shape[1] - 1) / 2) * max(0.002, 0.7 * rounding_m)
+    limit = np.sqrt(tree.m) * max(0.002, rounding_m)
     found = []
     for features in (_distances(file), _distances(file[:, ::-1])):
         distance, place = tree.query(features, k=2, distance_upper_bound=2 * limit)
@@ -170,7 +170,11 @@ def _alike(run: Array, file: Array, rounding_m: float) -> tuple[tuple[Integers, 
 
 
 def _distances(windows: Array) -> Array:
+    """Return all distances of a short window (w, 10), of a wide one those of beams 4, 7 and 14 apart, (w, 20)."""
     one, other = np.triu_indices(windows.shape[1], 1)
+    if windows.shape[1] == WIDE_WINDOW:
+        wanted = np.isin(other - one, (4, 7, 14))
+        one, other = one[wanted], other[wanted]
     return np.asarray(np.linalg.norm(windows[:, one] - windows[:, other], axis=2))
 
 

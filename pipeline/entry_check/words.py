@@ -7,13 +7,15 @@ from typing import Any
 import numpy as np
 
 from pipeline.console import plural, signed
-from pipeline.entry_check.answer import TOLERANCE_DEG, TOLERANCE_M, Answer
+from pipeline.entry_check.answer import Answer
 from pipeline.entry_check.check import EntryCheck
+from pipeline.entry_check.judging import TOLERANCE_DEG, TOLERANCE_M
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.mount import Mounted, setting_change
 from pipeline.text_table import text_table
 
 WIDTH = 100
+COARSE_M = 0.002
 SHOWN_EXCESS_M = 0.002  # a smaller scatter beyond rounding is not worth a word
 
 
@@ -38,7 +40,7 @@ def _answer(check: EntryCheck) -> Iterator[str]:
     elif answer.verdict == "wrong":
         yield f"Not entered rightly: {'; '.join(said[0])}."
     elif answer.verdict == "uncertain":
-        yield from _uncertain(answer)
+        yield from _uncertain(check)
     elif any(one.mount_is_right for one in answer.explanations):
         yield "Cannot be told: either was the mount entered wrongly, or it is right and something else is wrong:"
         yield from (f"  - {'; '.join(words)}" for words in said)
@@ -60,7 +62,8 @@ def _within(answer: Answer) -> str:
     return f"{max(most_mm, 0.1):.1f} mm, {max(answer.angle_deg, 0.001):.3f}°"
 
 
-def _uncertain(answer: Answer) -> Iterator[str]:
+def _uncertain(check: EntryCheck) -> Iterator[str]:
+    answer = check.answer
     most_deg = answer.angle_deg + answer.angle_limit_deg
     most_m = float((np.abs(answer.lever_m) + answer.lever_limit_m)[: 2 if answer.way.any_height else 3].max())
     yield (
@@ -69,13 +72,15 @@ def _uncertain(answer: Answer) -> Iterator[str]:
     )
     if answer.explanations[0].words:
         yield f"Besides: {'; '.join(answer.explanations[0].words)}."
-    if answer.excess_m <= SHOWN_EXCESS_M:
-        yield "Export more soundings, of all passes, with 3 decimals."
+    if check.file.points.rounding_m > COARSE_M:
+        yield "The file rounds its places to a centimetre or more: export text with 3 decimals."
+    elif answer.excess_m <= SHOWN_EXCESS_M:
+        yield "Export more soundings, of all passes."
 
 
 def _about_z(answer: Answer) -> Iterator[str]:
     """Yield how well z is known where a shift of all heights is free."""
-    if answer.way.any_height and answer.verdict in ("right", "right_but"):
+    if answer.way.any_height and answer.verdict in ("right", "right_but", "uncertain"):
         within_m = abs(float(answer.lever_m[2])) + float(answer.lever_limit_m[2])
         yield (
             f"z is known to {within_m:.3f} m only: the heights are above another surface, and roll and pitch alone "
