@@ -2,8 +2,8 @@
 
 All soundings of a ping are placed with one pose and one mount. So the distances between neighbouring beams are the same
 in the run and in the file, however wrong the mount, the CRS's origin or the height reference is. Noise makes them as
-individual as a fingerprint: 5 neighbours have 10 distances, of 15 some are taken. Exported files keep the order of pings
-and beams; where a file holds every n-th beam alone, beams n apart are compared.
+individual as a fingerprint: 5 neighbours have 10 distances, of 15 some are taken. Exported files keep the order of
+pings and beams; where a file holds every n-th beam alone, beams n apart are compared.
 
 Windows that follow each other as in the run are right, whatever poses the software had. Where the order tells nothing,
 those count that one mount explains.
@@ -24,7 +24,7 @@ Integers = NDArray[np.int64]
 WINDOW, WIDE_WINDOW = 5, 15  # beams; the wide one where coordinates are rounded to more than COARSE_M
 COARSE_M = 0.002
 LAGS = (1, 2, 3, 4)
-MOST_QUERIES, MOST_WIDE_QUERIES = 20_000, 4000
+MOST_QUERIES, MOST_WIDE_QUERIES = 20_000, 40_000
 TRIALS, DRAWN = 400, 3  # windows of a trial
 CLOSE_M = 0.15  # a window that a trial explains; a height reference that is wrong by 10 m tilts it by so much
 LEAST_WINDOWS = 8

@@ -57,7 +57,7 @@ class Judge:
         return bool(np.all(np.abs(self.way.fitted.lever_arm_m - lever_arm_m) <= TOLERANCE_M + self.lever_limit_m))
 
     def differs_clearly(self, value: Array, right: Array) -> bool:
-        """Whether an entered rotation or lever arm is so far from the right one that no other between them is likely."""
+        """Whether an entered rotation or lever arm is so far from the right one that hardly any lies in between."""
         if value.ndim == 2:
             off, allowed = np.degrees(np.abs(rotation_error(value, right))), TOLERANCE_DEG + self.angle_limit_deg
         else:
