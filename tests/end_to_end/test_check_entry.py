@@ -224,13 +224,13 @@ def test_a_grid_is_refused(run: Path, recorded: Recording, right: Entry, tmp_pat
 
 
 def test_another_session_is_refused(run: Path, recorded: Recording, right: Entry, tmp_path: Path) -> None:
-    """The same target, track and mount, but noise of its own."""
+    """The same target and mount, but another track and noise of its own."""
     noise = np.random.default_rng(6).normal(0, 0.01, (len(recorded.t_ns), 1))
     other = replace(
         recorded, points_m=recorded.points_m * (1 + noise / np.linalg.norm(recorded.points_m, axis=1)[:, None])
     )
     file = tmp_path / "a.xyz"
-    write_points(file, in_crs(georeferenced(other, right), UTM), 3)
+    write_points(file, in_crs(georeferenced(other, replace(right, wander_m=0.3)), UTM), 3)
     told = poolcal("check-entry", run, file)
     assert (told.status, told.out) == (2, "")
     assert "is it the same session?" in told.err
