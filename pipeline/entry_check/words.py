@@ -107,8 +107,9 @@ def _table(check: EntryCheck) -> list[str]:
 
 def _basis(check: EntryCheck) -> Iterator[str]:
     pairs, file, fitted = check.pairs, check.file, check.answer.way.fitted
+    taken = f", of which {len(file.points.row):,} were taken" if len(file.points.row) < file.near else ""
     yield (
-        f"{len(file.points.row):,} of the file's {file.rows:,} soundings lie near the track; {pairs.found:,} of "
+        f"{file.near:,} of the file's {file.rows:,} soundings lie near the track{taken}; {pairs.found:,} of "
         f"the run's {len(check.run.soundings.t_ns):,} that were taken were found again among them "
         f"({100 * pairs.share:.0f} %; by chance {100 * pairs.chance:.1f} %)."
     )
