@@ -124,12 +124,18 @@ def differences(result: dict[str, Any]) -> Iterator[Planted]:
                lever_arm_m=(f, -s, d), range_factor=1.002)  # fmt: skip
     yield case("sign of z, heights lower", ("wrong", "undecidable"), "sign_z", export=lower, lever_arm_m=(f, s, -d))
     wrong = ("wrong", "undecidable", "uncertain")
-    for changed in ({"angles_deg": (r + 0.03, p, h)}, {"lever_arm_m": (f, s + 0.012, d)}):
-        name = "roll 0.03 off" if "angles_deg" in changed else "x 0.012 m off"
-        for more in ({}, {"wander_m": 0.02}, {"gradient_per_s": -3.0}, {"range_factor": 1.002}):
-            yield case(f"{name} {more}", wrong, **changed, **more)
-    half = Export(share=0.02)
-    yield case("a fiftieth, by chance", ("right", "uncertain", "refused"), export=half)
+    slips: dict[str, dict[str, Any]] = {
+        "roll 0.03 off": {"angles_deg": (r + 0.03, p, h)},
+        "x 0.012 m off": {"lever_arm_m": (f, s + 0.012, d)},
+    }
+    works: dict[str, dict[str, Any]] = {
+        "": {}, ", trajectory 0.02 m": {"wander_m": 0.02}, ", sound speed falls": {"gradient_per_s": -3.0},
+        ", ranges +0.2 %": {"range_factor": 1.002},
+    }  # fmt: skip
+    for name, changed in slips.items():
+        for more, otherwise in works.items():
+            yield case(name + more, wrong, **changed, **otherwise)
+    yield case("a fiftieth, by chance", ("right", "uncertain", "refused"), export=Export(share=0.02))
 
 
 def right_entries(result: dict[str, Any], number: int, seed: int) -> Iterator[Planted]:

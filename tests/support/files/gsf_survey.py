@@ -20,7 +20,7 @@ def write_gsf(path: Path, recorded: Recording, placed_ecef_m: np.ndarray, water_
     )
     boat = [np.interp(recorded.t_ns, ins["t_ns"], np.degrees(ins[name])) for name in ("longitude_rad", "latitude_rad")]
     heading = np.interp(recorded.t_ns, ins["t_ns"], np.degrees(np.unwrap(ins["azimuth_rad"])))
-    azimuth, _, distance = geod.inv(*boat, longitude, latitude)
+    azimuth, _, distance = geod.inv(boat[0], boat[1], longitude, latitude)
     along, across = (distance * f(np.radians(azimuth - heading)) for f in (np.cos, np.sin))
     numbers = [np.round(100 * values).astype(int) for values in (along, across, water_height_m - height)]
     kept = numbers[2] >= 0  # a depth has no sign
