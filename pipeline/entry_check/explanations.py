@@ -18,6 +18,7 @@ from pipeline.entry_check.run_soundings import EntrySource
 from pipeline.entry_check.ways import EACH_VALUE, OWN, PLAIN
 
 Array = NDArray[np.float64]
+PART_NAMES = ANGLES, LEVER_ARM = "angles: ", "lever arm: "
 MOST_ATTITUDE_DEG = 5.0  # by more no INS is aligned wrongly
 UNKNOWN_ANGLES, OTHER_POINT, ATTITUDES = "unknown_angles", "other_point", "attitudes"
 
@@ -71,12 +72,12 @@ def explanations_of(judge: Judge, source: EntrySource) -> Iterator[Explanation]:
     values = _values(turn, TOLERANCE_DEG + judge.angle_limit_deg), _values(off, TOLERANCE_M + judge.lever_limit_m)
     words = f"the angles are off by {_turn_words(turn)}, and no known mistake explains it"
     other = Option(UNKNOWN_ANGLES, (words,), OWN + EACH_VALUE * values[0])
-    turned = _options("angles: ", angles, other, any(judge.differs_clearly(one.value, R) for one in _fewest(angles)))
+    turned = _options(ANGLES, angles, other, any(judge.differs_clearly(one.value, R) for one in _fewest(angles)))
     x, y, z = (signed(value, 3) for value in off)
     words = f"the lever arm is off by x {x}, y {y}, z {z} m (starboard, forward, up): it is counted from another point"
     other = Option(OTHER_POINT, (words,), OWN + EACH_VALUE * values[1])
     is_clear = any(judge.differs_clearly(one.value, lever_arm_m) for one in _fewest(arms))
-    for angle, arm in product(turned, _options("lever arm: ", arms, other, is_clear)):
+    for angle, arm in product(turned, _options(LEVER_ARM, arms, other, is_clear)):
         cost = way.cost + angle.cost + arm.cost
         yield Explanation((angle.key, arm.key, way.key), (*way.words, *angle.words, *arm.words), cost)
     if way.key in (PLAIN, "heights") and not is_right and np.linalg.norm(turn) <= MOST_ATTITUDE_DEG:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.console import signed
 from pipeline.entry_check.identification import Pairs
 from pipeline.entry_check.mount_fit import NAMES, FittedMount, fit_delay, fit_mount, freed
 from pipeline.entry_check.run_soundings import EntrySource, RunSoundings
@@ -121,9 +122,9 @@ def _shift_at(pairs: Pairs, fitted: FittedMount, source: EntrySource) -> Array:
 
 def _shift_words(shift_m: Array, source: EntrySource, any_height: bool) -> tuple[str, int]:
     """Return the sentence, and how many of the shift's values are more than rounding; 0: none of the level ones is."""
-    east, north, up = rotation_z(-source.azimuth_rad) @ shift_m
     counted = shift_m[:2] if any_height else shift_m
-    parts = [f"{east:+.3f} m east, {north:+.3f} m north"] + [f"{up:+.3f} m up"] * (not any_height)
+    east, north, up = (signed(value, 3) for value in rotation_z(-source.azimuth_rad) @ shift_m)
+    parts = [f"{east} m east, {north} m north"] + [f"{up} m up"] * (not any_height)
     values = int((np.abs(counted) > LEAST_SHIFT_M).sum())
     words = f"all soundings are shifted by {', '.join(parts)}: another datum or epoch, grid offsets, or other positions"
     return words, values if np.abs(shift_m[:2]).max() > LEAST_SHIFT_M else 0

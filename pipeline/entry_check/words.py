@@ -9,44 +9,67 @@ import numpy as np
 from pipeline.console import plural, signed
 from pipeline.entry_check.answer import Answer
 from pipeline.entry_check.check import EntryCheck
+from pipeline.entry_check.explanations import PART_NAMES, Explanation
 from pipeline.entry_check.judging import TOLERANCE_DEG, TOLERANCE_M
+from pipeline.language.chosen import translated
+from pipeline.language.letters import has_wide
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.mount import Mounted, setting_change
 from pipeline.text_table import text_table
 
 WIDTH = 100
+BULLET = "  - "
 COARSE_M = 0.002
 SHOWN_EXCESS_M = 0.002  # a smaller scatter beyond rounding is not worth a word
 
 
 def check_text(check: EntryCheck) -> str:
     """Return the answer as text for the screen."""
-    lines = [line for text in _answer(check) for line in textwrap.wrap(text, WIDTH, subsequent_indent="  ")]
+    lines = [line for text in _answer(check) for line in _wrapped(text, "  ")]
     lines += ["", *_table(check), ""]
-    lines += [line for text in _basis(check) for line in textwrap.wrap(text, WIDTH)]
+    lines += [line for text in _basis(check) for line in _wrapped(text, "")]
     return "\n".join(lines)
+
+
+def _wrapped(text: str, indent: str) -> list[str]:
+    """Return a sentence in lines, in the language of this process; one whose letters are wide stays one line."""
+    bullet, text = (BULLET, text.removeprefix(BULLET)) if text.startswith(BULLET) else ("", text)
+    words = translated(text)
+    if has_wide(words):
+        return [bullet + words]
+    return textwrap.wrap(bullet + words, WIDTH, subsequent_indent=" " * len(bullet) or indent)
+
+
+def _joined(explanation: Explanation) -> str:
+    """Return its sentences; what begins with the part's name is translated part by part."""
+    return "; ".join("".join(map(translated, _named(words))) for words in explanation.words)
+
+
+def _named(words: str) -> tuple[str, ...]:
+    name = next((name for name in PART_NAMES if words.startswith(name)), "")
+    return (name, words.removeprefix(name)) if name else (words,)
 
 
 def _answer(check: EntryCheck) -> Iterator[str]:
     answer = check.answer
-    said = [one.words for one in answer.explanations]
+    said = [_joined(one) for one in answer.explanations]
     if answer.verdict == "right":
         yield f"Entered rightly: within {_within(answer)}."
     elif answer.verdict == "right_but" and len(said) == 1:
-        yield f"Entered rightly, but {'; '.join(said[0])}."
+        yield f"Entered rightly, but {said[0]}."
     elif answer.verdict == "right_but":
         yield "Entered rightly, but one of these is wrong, and the soundings cannot tell which:"
-        yield from (f"  - {'; '.join(words)}" for words in said)
+        yield from (BULLET + words for words in said)
     elif answer.verdict == "wrong":
-        yield f"Not entered rightly: {'; '.join(said[0])}."
+        yield f"Not entered rightly: {said[0]}."
     elif answer.verdict == "uncertain":
         yield from _uncertain(check)
     elif any(one.mount_is_right for one in answer.explanations):
         yield "Cannot be told: either was the mount entered wrongly, or it is right and something else is wrong:"
-        yield from (f"  - {'; '.join(words)}" for words in said)
+        yield from (BULLET + words for words in said)
     else:
         yield "Not entered rightly. These mistakes give the same numbers, and the soundings cannot tell which it was:"
-        yield from (f"  - {'; '.join(words)}" for words in said)
+        yield from (BULLET + words for words in said)
     yield from _about_z(answer)
     if answer.excess_m > SHOWN_EXCESS_M:
         yield (
@@ -71,7 +94,7 @@ def _uncertain(check: EntryCheck) -> Iterator[str]:
         f"{most_deg:.3f}° and {most_m:.3f} m. A larger mistake is excluded."
     )
     if answer.explanations[0].words:
-        yield f"Besides: {'; '.join(answer.explanations[0].words)}."
+        yield f"Besides: {_joined(answer.explanations[0])}."
     if check.file.points.rounding_m > COARSE_M:
         yield "The file rounds its places to a centimetre or more: export text with 3 decimals."
     elif answer.excess_m <= SHOWN_EXCESS_M:
