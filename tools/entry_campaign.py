@@ -2,7 +2,7 @@
 
 Every planted mistake must be named, alone or among those that give the same numbers. Right entries with other CRS,
 forms of files, decimals, thinning, outliers and rounded settings must pass. Where the software works otherwise than the
-run, a right entry must not be called wrong, nor a wrong one right.
+run, a right entry must not be called wrong, nor a wrong one right; nor may one that is wrong by little.
 
     python -m tools.entry_campaign SESSION RUN [--right 100] [--kind differences] [--only WORDS] [--seed 1]
 """
@@ -19,7 +19,7 @@ from pipeline.entry_check.check import EntryCheck, check_entry
 from pipeline.errors import PoolcalError
 from pipeline.results.finished_run import FinishedRun
 from stages import ORDER
-from tools.entry_cases import Planted, differences, planted, right_entries
+from tools.entry_cases import Planted, differences, near_entries, planted, right_entries
 from tools.survey_software import Recording, georeferenced, in_crs, recording, write_points
 
 
@@ -66,16 +66,18 @@ def main() -> None:
     parser.add_argument("session", type=Path)
     parser.add_argument("run", type=Path)
     parser.add_argument("--right", type=int, default=100, help="number of right entries; default: 100")
+    parser.add_argument("--near", type=int, default=30, help="number of entries wrong by little; default: 30")
     parser.add_argument("--only", default="", help="cases whose words begin so")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--kind", default="", choices=("", "planted", "differences", "right"))
+    parser.add_argument("--kind", default="", choices=("", "planted", "differences", "right", "near"))
     options = parser.parse_args()
     run, recorded = FinishedRun.read(options.run, ORDER), recording(options.session)
     result = json.loads((options.run / "report" / "calibration.json").read_text(encoding="utf-8"))
     coarse = run.settings.session.sonar.mount.model_dump()
     result["mbes"]["mount_coarse"] = coarse
     rights = right_entries(result, options.right, options.seed)
-    kinds = {"planted": planted(result), "differences": differences(result), "right": rights}
+    kinds = {"planted": planted(result), "differences": differences(result), "right": rights,
+             "near": near_entries(result, options.near, options.seed)}  # fmt: skip
     cases = [case for kind, cases in kinds.items() if options.kind in ("", kind) for case in cases]
     good = 0
     chosen = [case for case in cases if case.words.startswith(options.only)]

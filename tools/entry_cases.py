@@ -8,6 +8,7 @@ import numpy as np
 
 from tools.survey_software import Entry, entry_of
 
+VALUES = ("roll", "pitch", "heading", "forward", "starboard", "down")
 FORMS = (".xyz", ".csv", ".las", ".laz")
 
 
@@ -139,27 +140,49 @@ def differences(result: dict[str, Any]) -> Iterator[Planted]:
 
 
 def right_entries(result: dict[str, Any], number: int, seed: int) -> Iterator[Planted]:
-    """Yield right entries with settings of three decimals, and exports of all kinds."""
+    """Yield right entries with settings of two to four decimals, and exports of all kinds."""
     right = entry_of(result)
     for k in range(number):
         random = np.random.default_rng([seed, k])
         angles = [round(angle, int(random.choice([2, 3, 4]))) for angle in right.angles_deg]
         arm = [round(length, 3) for length in right.lever_arm_m]
-        decimals = int(random.choice([2, 3, 3, 4]))
-        export = Export(
-            crs=str(random.choice(["utm", "EPSG:4978", "EPSG:4979", "EPSG:4549"])),
-            decimals=decimals,
-            form=str(random.choice(FORMS)),
-            share=float(random.choice([1.0, 0.5] if decimals == 2 else [1.0, 1.0, 0.5, 0.2, 0.1])),
-            every=1 if decimals == 2 else int(random.choice([1, 1, 2, 5])),
-            outliers=float(random.choice([0.0, 0.01, 0.1])),
-            seed=(seed, k),
+        words, export = _any_export(random, (seed, k))
+        entry = replace(right, angles_deg=_three(angles), lever_arm_m=_three(arm))
+        yield Planted(f"right {k}: {words}", entry, (), export, ("right",))
+
+
+def near_entries(result: dict[str, Any], number: int, seed: int) -> Iterator[Planted]:
+    """Yield entries that are wrong by one and a half to three tolerances in one value: none may be called right."""
+    right = entry_of(result)
+    for k in range(number):
+        random = np.random.default_rng([seed, k])
+        words, export = _any_export(random, (seed, k))
+        off = np.zeros(6)
+        off[k % 6] = random.choice([-1, 1]) * random.uniform(1.5, 3.0) * (0.01 if k % 6 < 3 else 0.005)
+        entry = replace(
+            right,
+            angles_deg=_three(right.angles_deg + off[:3]),
+            lever_arm_m=_three(right.lever_arm_m + off[3:]),
+            gradient_per_s=float(random.choice([0.0, 0.0, 0.3])),
+            wander_m=float(random.choice([0.0, 0.0, 0.003])),
         )
-        words = f"right {k}: {export.crs} {export.form} {decimals} decimals, {export.share:g}/{export.every}, "
-        words += f"outliers {export.outliers:g}"
-        yield Planted(
-            words, replace(right, angles_deg=_three(angles), lever_arm_m=_three(arm)), ("right",), export, ("right",)
-        )
+        wrong = f"near {k}: {VALUES[k % 6]} {off[k % 6]:+.4f}, "
+        yield Planted(wrong + words, entry, (), export, ("wrong", "undecidable", "uncertain"))
+
+
+def _any_export(random: np.random.Generator, seed: tuple[int, int]) -> tuple[str, Export]:
+    decimals = int(random.choice([2, 3, 3, 4]))
+    export = Export(
+        crs=str(random.choice(["utm", "EPSG:4978", "EPSG:4979", "EPSG:4549"])),
+        decimals=decimals,
+        form=str(random.choice(FORMS)),
+        share=float(random.choice([1.0, 0.5] if decimals == 2 else [1.0, 1.0, 0.5, 0.2, 0.1])),
+        every=1 if decimals == 2 else int(random.choice([1, 1, 2, 5])),
+        outliers=float(random.choice([0.0, 0.01, 0.1])),
+        seed=seed,
+    )
+    words = f"{export.crs} {export.form} {decimals} decimals, {export.share:g}/{export.every}, "
+    return f"{words}outliers {export.outliers:g}", export
 
 
 def _three(values: Any) -> tuple[float, float, float]:
