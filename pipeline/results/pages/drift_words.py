@@ -52,8 +52,8 @@ def drift_sentence(figures: pd.DataFrame) -> str:
     )
 
 
-def _estimated(figures: pd.DataFrame) -> Sequence[Mapping[str, Any]]:
-    rows: list[dict[str, Any]] = figures.to_dict("records")
+def _estimated(figures: pd.DataFrame) -> list[dict[str, Any]]:
+    rows = ({str(key): value for key, value in row.items()} for row in figures.to_dict("records"))
     return [row for row in rows if row["sigma_log"]]
 
 

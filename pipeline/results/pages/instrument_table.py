@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from pipeline.config.instruments import SENSORS, figures
+from pipeline.config.instruments import SENSORS, Sensor, figures
 from pipeline.config.pool import AsBuilt, LaserFit
 from pipeline.run.origins import origin_of, preset_of, value_of
 from pipeline.run.settings import Settings
@@ -53,7 +53,7 @@ def instrument_rows(settings: Settings, drift: Mapping[str, Any]) -> list[Row]:
     return rows
 
 
-def _figures(settings: Settings, sensor: str, drift: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
+def _figures(settings: Settings, sensor: Sensor, drift: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
     """Yield key, value in words, and origin of each figure of a sensor."""
     for key in [*figures(sensor), *_beside(settings, sensor)]:
         if key.startswith("drift.") and key.removeprefix("drift.") in drift["from_files"]:
