@@ -1,6 +1,5 @@
 """What the drift of the INS by the data means against its configured figures, in words for the report."""
 
-from collections.abc import Mapping, Sequence
 from typing import Any
 
 import pandas as pd
