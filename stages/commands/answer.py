@@ -35,7 +35,7 @@ def say_where(run: Path) -> None:
     if any(run.glob("*/*.rrd")):
         program = sys.argv[0] if Path(sys.argv[0]).name == "poolcal" else "poolcal"  # as the user called it
         place = str(run) if not str(run).startswith("-") else f"./{run}"
-        say(f"Recordings: {program} view {shlex.quote(place)}", sys.stdout)
+        say(f"Recordings: {shlex.quote(program)} view {shlex.quote(place)}", sys.stdout)
 
 
 def say_failures(failures: "Sequence[DrawingFailure]", but: str = "") -> None:
