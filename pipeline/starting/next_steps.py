@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path
 
+from pipeline import CONFIGS
 from pipeline.config.fill_in import Unfilled, what
 from pipeline.console import plural
 from pipeline.starting.file_groups import FileGroup
@@ -51,7 +52,8 @@ def steps_text(session: Path, pool: Path | None, open_keys: Sequence[tuple[Path,
     if mounts:
         sensors = " and ".join(sorted({one.key.partition(".")[0] for one in mounts}))
         steps.append(
-            f"The mounts of {sensors}: survey marks, fill in a copy of configs/marks.yaml, and let poolcal write them\n"
+            f"The mounts of {sensors}: survey marks, fill in a copy of\n"
+            f"     {shlex.quote(str(CONFIGS / 'marks.yaml'))}\n   and let poolcal write them\n"
             f"     {command('coarse', 'MARKS.yaml', '--session', session)}\n"
             f"   or measure them, and fill them in by hand."
         )

@@ -9,7 +9,7 @@ import typer
 
 INIT = "poolcal init FOLDER writes session.yaml and a pool's config from a folder of raw files"
 WANTED = {  # by required option: the words for the message if it is missing
-    "--config": "--config FILE: the pool's YAML file, which says where the target is; begin with configs/defaults.yaml",
+    "--config": "--config FILE: the pool's YAML file, which says where the target is; poolcal init begins one",
     "--run": "--run RUN: the folder for the results, outside the session folder",
     "--session": "--session SESSION: the folder with session.yaml",
 }

@@ -78,7 +78,7 @@ def test_words_of_others_name_the_command() -> None:
         (["zzz"], "No such command 'zzz'; see poolcal --help"),
         (["run"], "--run RUN: the folder for the results, outside the session folder; poolcal init FOLDER writes"),
         (["run", "x"], "--run RUN: the folder for the results, outside the session folder; poolcal init FOLDER writes"),
-        (["run", "x", "--run", "y"], "begin with configs/defaults.yaml; see poolcal run --help"),
+        (["run", "x", "--run", "y"], "poolcal init begins one; see poolcal run --help"),
         (["check", "."], "poolcal init . writes it from the raw files"),
     ],
 )
