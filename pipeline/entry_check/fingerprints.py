@@ -31,7 +31,8 @@ LEAST_WINDOWS = 8
 DELAYS_S = (0.0, 0.5, -0.5, 1.0, -1.0, 2.0, -2.0, 18.0, -18.0, 19.0, -19.0, 37.0, -37.0)  # GPS, UTC, TAI; whole seconds
 DELAY_TRIED = 1500  # soundings
 LEAST_WHOLE = 0.5  # of the beams of matched pings; another session over the same target has no whole pings alike
-LESS = 0.5  # a delay counts if it lessens the scatter so much
+POOR_M = 0.01  # a larger scatter may be a delay's,
+LESS = 0.5  # which counts if it lessens the scatter so much
 
 
 @dataclass(frozen=True)
@@ -106,17 +107,15 @@ def _by_order(soundings: RunSoundings, file: FilePoints, windows: Windows) -> Ma
     if share < LEAST_WHOLE:
         return None
     some = np.arange(0, len(own), max(1, len(own) // DELAY_TRIED))
-    tried = [(_delayed(soundings.rows(own[some]), one.points_m[other[some]]), one) for one in _signs(file)]
+    run, there = soundings.rows(own[some]), other[some]
+    tried = [(fit_mount(run, one.points_m[there], FREE_ALL), one) for one in _signs(file)]
     fitted, points = min(tried, key=lambda one: one[0].scatter_m)
+    if fitted.scatter_m > POOR_M:
+        free = freed("shift_x", "shift_y", "shift_z", "delay")
+        late = [(fit_mount(run, one.points_m[there], free, s), one) for one in _signs(file) for s in DELAYS_S]
+        better = min(late, key=lambda one: one[0].scatter_m)
+        fitted, points = better if better[0].scatter_m < LESS * fitted.scatter_m else (fitted, points)
     return Matches(own, other, points is not file, fitted, True)
-
-
-def _delayed(soundings: RunSoundings, points_m: Array) -> FittedMount:
-    """Return the mount, with the delay of the poses by which the scatter is least, if that is far less."""
-    plain = fit_mount(soundings, points_m, FREE_ALL)
-    free = freed("shift_x", "shift_y", "shift_z", "delay")
-    late = min((fit_mount(soundings, points_m, free, s) for s in DELAYS_S), key=lambda one: one.scatter_m)
-    return late if late.scatter_m < LESS * plain.scatter_m else plain
 
 
 def _by_mount(soundings: RunSoundings, file: FilePoints, windows: Windows) -> Matches | None:

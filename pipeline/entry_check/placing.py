@@ -105,6 +105,7 @@ def distance_m(placing: Placing, coordinates: Array, side: RunSide) -> float:
 
 def guessed(coordinates: Array, side: RunSide, geographic: bool | None) -> Placing | None:
     """Return the placing that brings the points nearest to the target, by degrees, UTM or ECEF; None: none does."""
+    coordinates = coordinates[:: max(1, len(coordinates) // SOME)]
     names = [GEOGRAPHIC] if geographic else [GEOGRAPHIC, utm_of(side), ECEF]
     tried = [placing_of(name, side, swapped) for name in names for swapped in (False, True)]
     best = min(tried, key=lambda placing: distance_m(placing, coordinates, side))

@@ -104,8 +104,14 @@ def test_a_right_entry_with_something_else_wrong(
     assert " ".join(text.out.split()).startswith(f"Entered rightly, but {said}")
 
 
-@pytest.mark.parametrize("wrong", [{}, {"lever_arm_m": (0.0, 0.012, 0.0)}, {"angles_deg": (0.04, 0.0, 0.0)}])
-@pytest.mark.parametrize("other", [{"gradient_per_s": -3.0}, {"wander_m": 0.03}, {"steer_factor": 1.003}])
+@pytest.mark.parametrize(
+    ("wrong", "other"),
+    [
+        ({}, {"gradient_per_s": -3.0}),
+        ({"lever_arm_m": (0.0, 0.012, 0.0)}, {"wander_m": 0.03}),
+        ({"angles_deg": (0.04, 0.0, 0.0)}, {"steer_factor": 1.003}),
+    ],
+)
 def test_other_rays_or_positions_prove_nothing_and_accuse_nobody(
     run: Path, recorded: Recording, right: Entry, tmp_path: Path, wrong: dict[str, Any], other: dict[str, Any]
 ) -> None:
