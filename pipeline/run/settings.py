@@ -84,7 +84,8 @@ def load_settings(session_folder: Path, config_path: Path, calibrated: Calibrate
     if session.mbes is not None:
         refuse_shallow_cast(pool.target, session.mbes, session_folder / SESSION_YAML)
     paths = {"session": session_folder / SESSION_YAML, "config": config_path}
-    files, stated = ({name: of(path) for name, path in paths.items()} for of in (sha256, stated_keys))
+    files = {name: sha256(path) for name, path in paths.items()}
+    stated = {name: stated_keys(path) for name, path in paths.items()}
     return Settings(session_folder.resolve(), pool, session, files, stated)
 
 

@@ -19,7 +19,7 @@ def drift_rows(figures: pd.DataFrame) -> list[dict[str, Any]]:
     figures
         The table ``drift_figures``.
     """
-    return [row | {"unit": UNIT[row["figure"].rpartition("_")[2]]} for row in _estimated(figures)]
+    return [{**row, "unit": UNIT[row["figure"].rpartition("_")[2]]} for row in _estimated(figures)]
 
 
 def drift_sentence(figures: pd.DataFrame) -> str:
@@ -53,7 +53,7 @@ def drift_sentence(figures: pd.DataFrame) -> str:
 
 
 def _estimated(figures: pd.DataFrame) -> Sequence[Mapping[str, Any]]:
-    rows: list[dict[str, Any]] = figures.to_dict("records")
+    rows: list[Any] = figures.to_dict("records")
     return [row for row in rows if row["sigma_log"]]
 
 

@@ -3,13 +3,13 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from pipeline.config.instruments import SENSORS, figures
+from pipeline.config.instruments import SENSORS, Sensor, figures
 from pipeline.config.pool import AsBuilt, LaserFit
 from pipeline.run.origins import origin_of, preset_of, value_of
 from pipeline.run.settings import Settings
 
 Row = Mapping[str, Any]
-BESIDE: Mapping[str, tuple[str, ...]] = {  # keys that no preset may set
+BESIDE: Mapping[Sensor, tuple[str, ...]] = {  # keys that no preset may set
     "ins": ("drift_within.sigmas", "drift_within.time_constant"),
     "laser": ("latency_sigma_s",),
     "mbes": ("sound_speed_sigma_m_s", "sound_speed_gradient_sigma_1_s", "latency_sigma_s"),
@@ -53,7 +53,7 @@ def instrument_rows(settings: Settings, drift: Mapping[str, Any]) -> list[Row]:
     return rows
 
 
-def _figures(settings: Settings, sensor: str, drift: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
+def _figures(settings: Settings, sensor: Sensor, drift: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
     """Yield key, value in words, and origin of each figure of a sensor."""
     for key in [*figures(sensor), *_beside(settings, sensor)]:
         if key.startswith("drift.") and key.removeprefix("drift.") in drift["from_files"]:
@@ -62,7 +62,7 @@ def _figures(settings: Settings, sensor: str, drift: Mapping[str, Any]) -> Itera
             yield key, _shown(value_of(settings, f"{sensor}.{key}")), origin_of(settings, f"{sensor}.{key}")
 
 
-def _beside(settings: Settings, sensor: str) -> tuple[str, ...]:
+def _beside(settings: Settings, sensor: Sensor) -> tuple[str, ...]:
     """Return the keys of a sensor's further figures: of its mount, of a cast, of its clock."""
     more: tuple[str, ...] = ()
     if sensor == "laser" and settings.session.calibrated == "mbes":
