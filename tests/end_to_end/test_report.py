@@ -77,9 +77,9 @@ def test_files_counts_settings_and_origin_are_listed(undisturbed: tuple[Path, To
     assert sorted((a, b, int(n.replace(",", ""))) for a, b, n in seen) == sorted(
         row for row in counts[["source", "reason", "count"]].itertuples(index=False, name=None) if row[2]
     )
-    changed = {row[1]: (row[2], row[3]) for row in page.table("file", "key", "value")}
-    assert changed["target.a"] == ("8.0", "")
-    assert changed["ins.drift.heading_deg"] == ("0.0", "0.03")
+    changed = {row[1]: (row[0], *row[2:]) for row in page.table("from", "key", "value")}
+    assert changed["target.a"] == ("pool", "8.0", "")
+    assert changed["ins.drift.heading_deg"] == ("session", "0.0", "0.03")
     assert "segment.margin_m" not in changed
     assert dict(page.table("raw file", "SHA-256")) == result["inputs"]
 
@@ -187,7 +187,7 @@ def test_drawn_again_only_with_cause(done: Place) -> None:
     assert path.read_bytes() == before  # the same run, the same page
     done.edit_config("ingest", max_gap_s=4.9)  # changes no pass here, and no input of the report
     assert done.calibrate("--report").status == 0
-    changed = {row[1]: row[2] for row in page_of(done.run).table("file", "key")}
+    changed = {row[1]: row[2] for row in page_of(done.run).table("from", "key", "value")}
     assert changed["ingest.max_gap_s"] == "4.9"
     assert poolcal("verify", done.run).status == 0
 

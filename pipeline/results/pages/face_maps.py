@@ -155,5 +155,5 @@ def _point_north(axis: Axes, azimuth_deg: float) -> None:
     place: dict[str, Any] = {"ha": "center", "va": "center"}
     box.add_artist(Text(half + 0.75 * half * along, half + 0.75 * half * up, "N", **place))
     axis.add_artist(
-        AnnotationBbox(box, (1.0, 0.5), xycoords="axes fraction", box_alignment=(0.0, 0.5), frameon=False, pad=0.0)
+        AnnotationBbox(box, (1.0, 0.5), xycoords=axis.transAxes, box_alignment=(0.0, 0.5), frameon=False, pad=0.0)
     )

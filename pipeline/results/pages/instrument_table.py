@@ -9,7 +9,7 @@ from pipeline.run.origins import origin_of, preset_of, value_of
 from pipeline.run.settings import Settings
 
 Row = Mapping[str, Any]
-BESIDE: Mapping[str, tuple[str, ...]] = {  # keys that no preset may set
+BESIDE: Mapping[Sensor, tuple[str, ...]] = {  # keys that no preset may set
     "ins": ("drift_within.sigmas", "drift_within.time_constant"),
     "laser": ("latency_sigma_s",),
     "mbes": ("sound_speed_sigma_m_s", "sound_speed_gradient_sigma_1_s", "latency_sigma_s"),
@@ -62,7 +62,7 @@ def _figures(settings: Settings, sensor: Sensor, drift: Mapping[str, Any]) -> It
             yield key, _shown(value_of(settings, f"{sensor}.{key}")), origin_of(settings, f"{sensor}.{key}")
 
 
-def _beside(settings: Settings, sensor: str) -> tuple[str, ...]:
+def _beside(settings: Settings, sensor: Sensor) -> tuple[str, ...]:
     """Return the keys of a sensor's further figures: of its mount, of a cast, of its clock."""
     more: tuple[str, ...] = ()
     if sensor == "laser" and settings.session.calibrated == "mbes":

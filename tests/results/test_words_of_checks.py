@@ -1,0 +1,108 @@
+"""The report's words on the patent's form, on the drift, and on the faces: they follow from the numbers."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from pipeline.config.target import Letters, Origin
+from pipeline.language import chosen
+from pipeline.maths.target.face import Face
+from pipeline.maths.target.family_words import families_in_words
+from pipeline.results.pages.drift_words import drift_rows, drift_sentence
+from pipeline.results.pages.patent_check import patent_check
+from pipeline.target.design import target_of
+from pipeline.text_table import SCREEN, wrapped
+from tests.support.evidence import drift_figures
+
+KEYS = ("roll_deg", "pitch_deg", "yaw_deg", "x_m", "y_m", "z_m")
+SIGMAS = dict(zip(KEYS, (0.02, 0.02, 0.01, 0.004, 0.002, 0.004), strict=True))
+
+
+def _methods(**off: float) -> dict[str, dict[str, object]]:
+    adjusted = dict.fromkeys(KEYS, 0.0)
+    return {
+        "adjustment": {"mount": adjusted, "sigma_mount_total": SIGMAS},
+        "patent_alternating": {"mount": adjusted | off},
+    }
+
+
+# --- the patent's form -----------------------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    ("off", "said", "holds"),
+    [
+        ({"roll_deg": 0.058}, "off by 2.9 total sigmas at most (roll +0.058 °)", True),
+        ({"roll_deg": 0.062}, "off by 3.1 total sigmas at most (roll +0.062 °), more than 3", False),
+        ({"x_m": -0.013}, "off by 3.2 total sigmas at most (x -13.0 mm)", False),
+        ({"yaw_deg": 0.2, "y_m": 0.025}, "off by 0.0 total sigmas", True),  # of these it tells nothing
+    ],
+)
+def test_the_patent_s_check_is_off_beyond_three_sigmas(off: dict[str, float], said: str, holds: bool) -> None:
+    words = patent_check(_methods(**off))
+    assert said in words
+    assert ("the check holds" in words, "does not hold" in words) == (holds, not holds)
+
+
+def test_a_turn_through_180_degrees_is_no_difference() -> None:
+    methods = _methods(roll_deg=-179.99)
+    methods["adjustment"]["mount"] = dict.fromkeys(KEYS, 0.0) | {"roll_deg": 179.99}
+    assert "roll +0.020 °): the check holds" in patent_check(methods)
+
+
+def test_without_a_form_there_is_no_check() -> None:
+    methods = _methods()
+    assert patent_check({"adjustment": methods["adjustment"]}) == ""
+    assert patent_check(methods | {"patent_alternating": {"mount": None}}) == ""
+
+
+# --- the drift -------------------------------------------------------------------------------------------------------
+def _figures(**changes: tuple[float, float]) -> pd.DataFrame:
+    return drift_figures(**changes).assign(sigma_log=0.5)
+
+
+def test_a_smaller_and_slower_drift_is_all_right() -> None:
+    figures = _figures(horizontal_m=(0.0015, -3.0), time_constant_s=(5650.0, 3.0))
+    words = drift_sentence(figures)
+    assert "its errors of position are 0.10 times as large" in words
+    assert "those of attitude about as large" in words
+    assert "and the time over which they change 28 times as large" in words
+    assert "That is all right" in words
+    assert [row["unit"] for row in drift_rows(figures)] == ["m", "m", "°", "°", "s"]
+
+
+def test_a_larger_or_a_faster_drift_is_not() -> None:
+    for change in ({"horizontal_m": (0.15, 3.0)}, {"time_constant_s": (10.0, -3.0)}):
+        words = drift_sentence(_figures(**change))
+        assert "see the warnings" in words
+        assert "all right" not in words
+
+
+def test_an_exact_drift_says_nothing() -> None:
+    assert drift_sentence(drift_figures().assign(sigma_log=0.0)) == ""
+
+
+# --- the faces -------------------------------------------------------------------------------------------------------
+def test_the_patent_s_target_is_told_as_the_boat_sees_it() -> None:
+    origin = Origin(latitude_deg=36.0, longitude_deg=120.0, height_m=0.0)
+    model = target_of(Letters(a=8.0, b=3.0, c=1.0, e=0.5, origin=origin, azimuth_deg=163.0))
+    words = families_in_words(model)
+    assert "P1: 8 faces turned 45° astern (-y); P2: 1 face straight towards the boat; P3: 8 faces turned 45° ahead" in (
+        words
+    )
+    assert words.endswith("faces, horizontal (tops and bottoms)")
+    north = [face for face in model.faces if face.family == "P3"]  # an own look at the sign: P3 stands at y > 0
+    assert all(isinstance(face, Face) and np.min(np.asarray(face.vertices_m)[:, 1]) > 0 for face in north)
+
+
+# --- the screen ------------------------------------------------------------------------------------------------------
+def test_sentences_keep_within_the_screen(monkeypatch: pytest.MonkeyPatch) -> None:
+    words = " ".join(f"word{number}" for number in range(60)) + " " + "x" * 130 + " end"
+    lines = wrapped(words, "  ", "    ")
+    assert " ".join(" ".join(lines).split()) == words
+    assert [line for line in lines if len(line) > SCREEN] == ["    " + "x" * 130]
+    assert lines[0].startswith("  word0")
+    chinese = "没有任何安装参数能使其点落在标靶上，" * 12
+    lines = wrapped(chinese, following="")
+    assert "".join(lines) == chinese
+    assert max(sum(1 + (ord(letter) > 0x2E80) for letter in line) for line in lines) <= SCREEN + 2
+    assert not any(line.startswith("，") for line in lines)
+    assert chosen.language() == chosen.ENGLISH
