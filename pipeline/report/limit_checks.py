@@ -35,22 +35,25 @@ def sigmas_above_limit(
     return [
         Statement(
             ReasonCode.SIGMA_ABOVE_LIMIT,
-            f"total sigma of {MOUNT_WORDS[place]} is {sigmas[key]:.4g}{bounds[unit][1]}, above the limit of "
-            f"{bounds[unit][0]:g}{bounds[unit][1]}{_largest(sources, place, unit)}",
+            _with_largest(
+                f"total sigma of {MOUNT_WORDS[place]} is {f'{sigmas[key]:.4g}{bounds[unit][1]}'}, above the limit of "
+                f"{f'{bounds[unit][0]:g}{bounds[unit][1]}'}",
+                sources, place, unit,
+            ),
         )
         for name, place, key, unit in PARAMETERS
         if name not in held and not sigmas[key] <= bounds[unit][0]
     ]
 
 
-def _largest(sources: Mapping[str, NDArray[np.float64]], place: int, unit: str) -> str:
-    """Return in words the largest contributions to one sigma; nothing if no source is known."""
+def _with_largest(sentence: str, sources: Mapping[str, NDArray[np.float64]], place: int, unit: str) -> str:
+    """Return a sentence with the largest contributions to one sigma; as it is if no source is known."""
     scale, symbol = (float(np.degrees(1.0)), "°") if unit == "deg" else (1.0, " m")
     sizes = {words: scale * float(of_source[place]) for words, of_source in sources.items()}
     least = np.sqrt(LEAST_SHARE * sum(size**2 for size in sizes.values()))
     largest = sorted(sizes.items(), key=lambda item: -item[1])[:NAMED_SOURCES]
     named = [f"{words} ({size:.2g}{symbol})" for words, size in largest if size > least]
-    return f"; {LARGEST} {', '.join(named)}" if named else ""
+    return f"{sentence}; {LARGEST} {', '.join(named)}" if named else sentence
 
 
 def patent_reasons(

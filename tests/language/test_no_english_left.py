@@ -69,7 +69,7 @@ def test_two_runs_and_many(done: Place, monkeypatch: pytest.MonkeyPatch) -> None
         planted(folder, done.run, f"run{day}", day, z_m=shift)
     planted(folder, done.run, "refused", 5, verdict="rejected", nothing=True)
     page = done.folder / "diff.html"
-    texts = screen(poolcal("diff", folder / "run1", folder / "run3", "--out", page))
+    texts = screen(poolcal("diff", folder / "run1", folder / "run3", "--html", page))
     texts += screen(poolcal("history", folder)) + texts_of_page(folder / "history" / "history.html")
     texts += texts_of_page(page) + (pictures if fonts_of("zh") else [])
     assert_chinese(texts, done.folder, "run1", "run2", "run3", "run4", "refused")
