@@ -32,28 +32,24 @@ def sigmas_above_limit(
     if sigmas is None:
         return [Statement(ReasonCode.NO_COVARIANCE, "the adjustment has no covariance")]
     bounds = {"deg": (limits.max_sigma_deg, "°"), "m": (limits.max_sigma_m, " m")}
-    return [
-        Statement(
-            ReasonCode.SIGMA_ABOVE_LIMIT,
-            _with_largest(
-                f"total sigma of {MOUNT_WORDS[place]} is {f'{sigmas[key]:.4g}{bounds[unit][1]}'}, above the limit of "
-                f"{f'{bounds[unit][0]:g}{bounds[unit][1]}'}",
-                sources, place, unit,
-            ),
-        )
-        for name, place, key, unit in PARAMETERS
-        if name not in held and not sigmas[key] <= bounds[unit][0]
-    ]
+    found = []
+    for name, place, key, unit in PARAMETERS:
+        limit, symbol = bounds[unit]
+        if name not in held and not sigmas[key] <= limit:
+            above, most = f"{sigmas[key]:.4g}{symbol}", f"{limit:g}{symbol}"
+            words = f"total sigma of {MOUNT_WORDS[place]} is {above}, above the limit of {most}"
+            found.append(Statement(ReasonCode.SIGMA_ABOVE_LIMIT, f"{words}{_largest(sources, place, unit)}"))
+    return found
 
 
-def _with_largest(sentence: str, sources: Mapping[str, NDArray[np.float64]], place: int, unit: str) -> str:
-    """Return a sentence with the largest contributions to one sigma; as it is if no source is known."""
+def _largest(sources: Mapping[str, NDArray[np.float64]], place: int, unit: str) -> str:
+    """Return in words the largest contributions to one sigma; nothing if no source is known."""
     scale, symbol = (float(np.degrees(1.0)), "°") if unit == "deg" else (1.0, " m")
     sizes = {words: scale * float(of_source[place]) for words, of_source in sources.items()}
     least = np.sqrt(LEAST_SHARE * sum(size**2 for size in sizes.values()))
     largest = sorted(sizes.items(), key=lambda item: -item[1])[:NAMED_SOURCES]
     named = [f"{words} ({size:.2g}{symbol})" for words, size in largest if size > least]
-    return f"{sentence}; {LARGEST} {', '.join(named)}" if named else sentence
+    return f"; {LARGEST} {', '.join(named)}" if named else ""
 
 
 def patent_reasons(
