@@ -1,10 +1,15 @@
-"""Tables of text for the screen and for recordings."""
+"""Tables of text, and sentences in lines, for the screen and for recordings."""
 
 import re
 from collections.abc import Iterable, Sequence
 
 from pipeline.language import letters
 from pipeline.language.chosen import translated
+
+SCREEN = 100  # columns of the screen within which sentences are kept
+_PIECE = re.compile(  # what stays together on a line: a word, or one letter of East Asia, with the marks behind it
+    r"\s*(?:[\u2e80-\uffef]|[^\s\u2e80-\uffef]+)[、。，；：）？！]*"
+)
 
 
 def text_table(layout: str, header: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
@@ -42,3 +47,26 @@ def text_table(layout: str, header: Sequence[str], rows: Iterable[Sequence[str]]
         ).rstrip()
         for line in lines
     ]
+
+
+def wrapped(text: str, first: str = "", following: str = "  ") -> list[str]:
+    r"""Return a sentence in the language of this process, in lines of at most 100 columns; longer words stay whole.
+
+    Parameters
+    ----------
+    text
+        The sentence.
+    first, following
+        What stands before the first line, and before each further one.
+
+    >>> [len(line) for line in wrapped("word " * 30, "- ")]
+    [96, 56]
+    """
+    lines, line, begun = [], first, False
+    for piece in _PIECE.findall(translated(text)):
+        if begun and letters.width(line + piece) > SCREEN:
+            lines.append(line)
+            line, begun = following, False
+        line += piece if begun else piece.lstrip()
+        begun = True
+    return [*lines, line]

@@ -5,9 +5,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from pipeline.checking import clocks, file_checks, target_hits, track_checks
 from pipeline.checking.expected_soundings import PingsOnTarget, SoundingCounts, count_soundings, faces_missed
+from pipeline.checking.file_lines import gaps_of
 from pipeline.checking.file_survey import SENSORS, SurveyedFile, Times, survey_files
 from pipeline.checking.findings import Finding
 from pipeline.checking.ins_quality import InsQuality, assess_ins_quality, quality_findings
@@ -36,6 +38,7 @@ class SessionCheck:
     model: TargetModel | None = None  # None: the check ended before the passes
     soundings: SoundingCounts | None = None  # None: the soundings were not counted
     quality: InsQuality = field(default_factory=InsQuality)
+    gaps: pd.DataFrame | None = None  # None: the INS has no records
 
     @property
     def faulty(self) -> bool:
@@ -84,9 +87,11 @@ def _check(folder: Path, session: SessionConfig, pool: PoolConfig | None, calibr
     max_gap_s = (Ingest() if pool is None else pool.ingest).max_gap_s
     coarseness_ns = max(file.coarseness_ns for file in files if file.sensor == "ins")
     weeks = {"ins": session.ins.gps_week, "laser": session.laser.gps_week}
-    findings += clocks.clock_findings(epochs, max(round(max_gap_s * NS), round(coarseness_ns)), files, weeks)
+    max_gap_ns = max(round(max_gap_s * NS), round(coarseness_ns))
+    findings += clocks.clock_findings(epochs, max_gap_ns, files, weeks)
+    gaps = gaps_of(epochs, max_gap_ns)
     if pool is None:
-        return SessionCheck(tuple(files), (), tuple(findings))
+        return SessionCheck(tuple(files), (), tuple(findings), gaps=gaps)
     unusable = {finding.words.split(":")[0] for finding in findings if finding.question == "clock"}
     unusable |= {"laser", "mbes"} if "ins" in unusable else set()
     unusable |= {"laser" for finding in findings if finding.question == "frame"}
@@ -94,7 +99,7 @@ def _check(folder: Path, session: SessionConfig, pool: PoolConfig | None, calibr
     if session.mbes is not None:
         findings += track_checks.survey_findings(pool)
     at_target = _check_at_target(_Session(files, session, pool, target_of(pool.target), calibrate), epochs, unusable)
-    return replace(at_target, findings=(*findings, *at_target.findings))
+    return replace(at_target, findings=(*findings, *at_target.findings), gaps=gaps)
 
 
 def _file_findings(

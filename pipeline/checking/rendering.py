@@ -7,26 +7,48 @@ import numpy as np
 
 from pipeline.checking.check_session import SessionCheck
 from pipeline.checking.expected_soundings import USUAL
+from pipeline.checking.file_lines import gaps_line, left_out_lines
 from pipeline.checking.file_survey import SurveyedFile
 from pipeline.checking.ins_quality import InsQuality
 from pipeline.gps_time import utc_text
+from pipeline.maths.target.family_words import families_in_words
 from pipeline.maths.target.model import names_in_order
-from pipeline.text_table import text_table
+from pipeline.text_table import text_table, wrapped
 
 
-def check_text(examined: SessionCheck) -> str:
-    """Return the text for the screen: files, quality of the INS, passes, soundings and findings."""
+OF_PASSES = (
+    "From, seconds, distance and speed are of the part of a pass beside the target; in the report they are of the "
+    "whole pass, which begins earlier."
+)
+ESTIMATED = "~: estimated from a sample of the soundings."
+
+
+def check_text(examined: SessionCheck, note: str = "") -> str:
+    """Return the text for the screen: files, quality of the INS, passes, soundings and findings.
+
+    Parameters
+    ----------
+    examined
+        The session, checked.
+    note
+        A sentence that is no finding; empty: none.
+    """
     heads = ("sensor", "file", "kind", "records", "from (UTC)", "to", "rate")
     lines = text_table("<7<4  <24>11  <21<10>9", heads, [_file_cells(file) for file in examined.files])
     if any(file.share < 1 or not file.ended for file in examined.files):
         lines.append("~: read in part")
+    lines += left_out_lines(examined.files)
     lines += _quality_lines(examined.quality)
+    if examined.gaps is not None and len(examined.gaps):
+        lines += wrapped(gaps_line(examined.gaps))
+    lines += wrapped(f"Note: {note}.") if note else []
     if examined.legs:
         lines += ["", *_pass_lines(examined)]
     lines += _soundings_lines(examined)
     lines.append("")
     for severity, head in (("fault", "Wrong"), ("look", "But look")):
-        lines += [f"{head}: {finding.words}." for finding in examined.findings if finding.severity == severity]
+        sentences = [f"{head}: {found.words}." for found in examined.findings if found.severity == severity]
+        lines += [line for sentence in sentences for line in wrapped(sentence)]
     if not examined.findings:
         lines.append("Nothing found.")
     return "\n".join(lines)
@@ -47,7 +69,7 @@ def _pass_lines(examined: SessionCheck) -> list[str]:
         for number, leg in enumerate(examined.legs)
     ]
     heads = ("pass", "from (UTC)", "seconds", "distance", "speed", "laser", "sonar")
-    return text_table("<6<22>8>10>10>8>8  <1", heads, rows)
+    return [*text_table("<6<22>8>10>10>8>8  <1", heads, rows), *wrapped(OF_PASSES, following="")]
 
 
 def _quality_lines(found: InsQuality) -> list[str]:
@@ -56,7 +78,7 @@ def _quality_lines(found: InsQuality) -> list[str]:
     for name, kinds in found.by_file.items():
         for counts in kinds.values():
             shares = (f"{state} {number / counts.total():.0%}" for state, number in counts.most_common())
-            lines.append(f"{name}: {', '.join(shares)}")
+            lines.append(f"{name}: {', '.join(shares)} of {counts.total():,} records used")
     if found.sigmas:
         units = {name: "°" if name.endswith("deg") else " m" for name in found.sigmas}
         axes = {name: name.rpartition("_")[0].replace("_", " and ") for name in found.sigmas}
@@ -89,7 +111,9 @@ def _soundings_lines(examined: SessionCheck) -> list[str]:
         expected, found = (sum(f[key] for f in faces if f["family"] == family) for key in ("expected", "found"))
         share = f"{found / expected:.0%}" if expected else "-"
         rows.append((family, f"~{expected}", f"~{found}", share))
-    return ["", *text_table("<22>10>10>8 <1", ("soundings on", "expected", "found", "share", f"({USUAL})"), rows)]
+    table = text_table("<22>10>10>8 <1", ("soundings on", "expected", "found", "share", f"({USUAL})"), rows)
+    families = () if examined.model is None else wrapped(f"{families_in_words(examined.model)}.", following="")
+    return ["", *table, ESTIMATED, *families]
 
 
 def _file_cells(file: SurveyedFile) -> tuple[str, ...]:
@@ -109,10 +133,11 @@ def _rate(rate_hz: float) -> str:
     return f"{float(f'{rate_hz:.3g}'):.15g} Hz"
 
 
-def check_json(examined: SessionCheck) -> str:
-    """Return files, quality of the INS, passes, soundings and findings as JSON; times are GPS nanoseconds."""
+def check_json(examined: SessionCheck, note: str = "") -> str:
+    """Return the same as JSON; times are GPS nanoseconds."""
     content: dict[str, Any] = {
         "faulty": examined.faulty,
+        "notes": [note] if note else [],
         "findings": [{"question": f.question, "severity": f.severity, "words": f.words} for f in examined.findings],
         "files": [
             {

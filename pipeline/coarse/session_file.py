@@ -38,7 +38,7 @@ def read_session(folder: Path) -> tuple[str, Content]:
     path = session_yaml(folder)
     text = text_of(path)
     content = _without_unfilled_mounts(content_of(text, path))
-    refuse_unfilled(text, path, may_be=lambda one: one.block in MOUNTS or one.key in MOUNTS)
+    refuse_unfilled({path: text}, may_be=lambda one: one.block in MOUNTS or one.key in MOUNTS)
     _check(content, folder)
     return text, content
 

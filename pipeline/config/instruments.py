@@ -70,7 +70,7 @@ def load_instrument(path: Path) -> Instrument:
     instrument = parse(Instrument, read_yaml(path), str(path))
     parse(settings_model(instrument.sensor), instrument.settings, f"{path}: settings")
     parse(rates_model(instrument.sensor), instrument.rates, f"{path}: rates")
-    keys = set(_dotted_keys(instrument.settings)) & {*figures(instrument.sensor)}
+    keys = set(dotted_keys(instrument.settings)) & {*figures(instrument.sensor)}
     keys |= {f"rates.{key}" for key in instrument.rates}
     for key in instrument.unverified:
         if key not in keys:
@@ -95,7 +95,7 @@ def merge_presets(content: Block, folder: Path) -> tuple[Block, frozenset[str]]:
         ``ins.drift.heading_deg``), without keys that only a preset has.
     """
     full = {sensor: _with_preset(sensor, content[sensor], folder) for sensor in SENSORS if sensor in content}
-    return content | full, frozenset(_dotted_keys(content))
+    return content | full, frozenset(dotted_keys(content))
 
 
 def _with_preset(sensor: Sensor, block: Any, folder: Path) -> Any:
@@ -104,7 +104,7 @@ def _with_preset(sensor: Sensor, block: Any, folder: Path) -> Any:
     if name is None:
         return block
     instrument = _instrument_by_name(sensor, name, folder)
-    own, preset = set(_dotted_keys(block)), set(_dotted_keys(instrument.settings))
+    own, preset = set(dotted_keys(block)), set(dotted_keys(instrument.settings))
     used = {  # InstrumentUsed
         "name": name,
         "title": instrument.title,
@@ -136,12 +136,12 @@ def figures(sensor: Sensor) -> list[str]:
     return [key for group in keys for key in group]
 
 
-def _dotted_keys(content: Mapping[Any, Any], prefix: str = "") -> Iterator[str]:
+def dotted_keys(content: Mapping[Any, Any], prefix: str = "") -> Iterator[str]:
     """Yield the dotted keys of nested blocks: first a block's own key, then the keys in it."""
     for key, value in content.items():
         yield f"{prefix}{key}"
         if isinstance(value, dict):
-            yield from _dotted_keys(value, f"{prefix}{key}.")
+            yield from dotted_keys(value, f"{prefix}{key}.")
 
 
 # --- files -----------------------------------------------------------------------------------------------------------

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.config.fill_in import read_filled, refuse_unfilled
-from pipeline.config.instruments import merge_presets
+from pipeline.config.instruments import dotted_keys, merge_presets
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import SessionConfig
 from pipeline.config.target_mesh import with_mesh
@@ -22,7 +22,7 @@ def load_pool(path: Path) -> PoolConfig:
     content = content_of(text, path)
     if "target" not in content and {"ins", "laser"} & content.keys():
         raise ConfigError(f"{path}: is a session's file; --config wants the pool's, which says where the target is")
-    refuse_unfilled(text, path)
+    refuse_unfilled({path: text})
     return parse(PoolConfig, with_mesh(content, path), str(path))
 
 
@@ -65,3 +65,13 @@ def load_session(
         # The drift comes from a preset: sigmas in the INS files take precedence over it.
         content = content | {"ins": {"drift_from": "files"} | ins}
     return parse(SessionConfig, {"name": folder.resolve().name[:300] or "session"} | content, str(path))
+
+
+def stated_keys(path: Path) -> tuple[str, ...]:
+    """Return the dotted keys to which a YAML file itself gives a value (``ins.drift.heading_deg``), in its order.
+
+    A block's own key is none of them, nor are keys below ``about``, from which nothing is computed.
+    """
+    keys = list(dotted_keys(content_of(text_of(path), path)))
+    blocks = {key.rpartition(".")[0] for key in keys}
+    return tuple(key for key in keys if key not in blocks and key.partition(".")[0] != "about")

@@ -12,6 +12,9 @@ from pipeline.config.quantities import Model, NotNegative, Positive, SigmaDeg, S
 from pipeline.config.target import Origin, Target
 
 
+FARTHEST = 1.5  # farthest correction of the coarse mount that is accepted, in units of segment.search_mount_...
+
+
 class AsBuilt(Model):
     """The target as surveyed: offsets of faces from the design, and how far they may still be wrong (sigmas)."""
 
@@ -69,7 +72,7 @@ class Segment(Model):
 
         The limits allow an error of the coarse mount half as large again as the configured search.
         """
-        return 1.5 * self.search_mount_deg, 1.5 * self.search_mount_m
+        return FARTHEST * self.search_mount_deg, FARTHEST * self.search_mount_m
 
 
 class FitPlanes(Model):

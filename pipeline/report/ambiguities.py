@@ -4,9 +4,11 @@ from dataclasses import dataclass
 
 import pandas as pd
 
+from pipeline.config.pool import FARTHEST
 from pipeline.config.session import Calibrated
 from pipeline.maths.mount_parameters import MOUNT_WORDS
 from pipeline.report.reason_codes import ReasonCode, Statement
+from pipeline.target.laser_search import LARGEST_TURN
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,8 +83,9 @@ def _no_laser_mount(mount: pd.Series, search: MountSearch, shape: str) -> str:
     """Return the sentence that no laser mount within the search limits fits, with the components beyond them."""
     excess = _best_fit(mount, search)
     return (
-        f"no mount of the laser within {search.max_angle_deg:g}° of the coarse one brings its points onto the "
-        f"target{excess}: laser.mount is farther off than segment.search_laser_deg allows, or {shape} are wrong"
+        f"no mount of the laser within {search.max_angle_deg:g}° of the coarse one ({LARGEST_TURN:g} times "
+        f"segment.search_laser_deg) brings its points onto the target{excess}: laser.mount is farther off than that, "
+        f"or {shape} are wrong"
     )
 
 
@@ -92,9 +95,10 @@ def _no_sonar_mount(mount: pd.Series, search: MountSearch, shape: str, alone: bo
     angles_alone = "°" in excess and " m" not in excess
     advice = search.angles_advice if angles_alone and alone else ""
     return (
-        f"no mount within {search.max_angle_deg:g}° and {search.max_lever_arm_m:g} m of the coarse one brings the "
-        f"soundings onto the target{excess}: mbes.mount is farther off than segment.search_mount_deg and "
-        f"search_mount_m allow (a sign, an axis, a block of 2 e), {shape} are wrong, or the clocks differ (UTC is "
+        f"no mount within {search.max_angle_deg:g}° and {search.max_lever_arm_m:g} m of the coarse one ({FARTHEST:g} "
+        f"times segment.search_mount_deg = {search.max_angle_deg / FARTHEST:g} and search_mount_m = "
+        f"{search.max_lever_arm_m / FARTHEST:g}) brings the soundings onto the target{excess}: mbes.mount is farther "
+        f"off than that (a sign, an axis, a block of 2 e), {shape} are wrong, or the clocks differ (UTC is "
         f"18 s behind GPS time): poolcal check tells which sign, clock or height it is{advice}"
     )
 

@@ -1,23 +1,23 @@
 """The result of a run on one screen."""
 
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from pipeline.console import signed
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.mount import setting_change
 from pipeline.report.reason_codes import verdict_in_words
-from pipeline.text_table import text_table
+from pipeline.text_table import SCREEN, text_table, wrapped
 
 SIGMAS_IN_WORDS = {
     "mbes": (
         "sigma: the random part, from the noise of the sensors and the INS, relative to the laser.",
-        "total: with the systematic errors of the laser's mount, ranges, sound speed, clocks, target. Use this sigma.",
+        "total: with the systematic errors of the laser's mount, ranges, sound speed, clocks, target.",
     ),
     "laser": (
         "sigma: the random part, from the noise of the laser and the INS.",
-        "total: with the uncertainty of target and coarse mount, and the errors of ranges and clock. Use this sigma.",
+        "total: with the uncertainty of target and coarse mount, and the errors of ranges and clock.",
     ),
 }
 
@@ -28,9 +28,9 @@ def summary(calibration: Mapping[str, Any]) -> str:
     verdict, colon, good = verdict_in_words(calibration["verdict"], held).partition(": ")
     lines = [f"{calibration['session']}: {verdict.upper()}{colon}{good}"]
     rejected = calibration["verdict"] == "rejected"
-    lines += [f"  because {reason}" for reason in calibration["reasons"]]
+    lines += _indented(f"because {reason}" for reason in calibration["reasons"])
     lines += [f"  not good enough: {', '.join(held)}"] if colon else []
-    lines += [f"  warning: {warning}" for warning in calibration["warnings"]]
+    lines += _indented(f"warning: {warning}" for warning in calibration["warnings"])
     sensor = calibration.get("calibrated", "mbes")
     lines += ["", *_mount_table(calibration, sensor)]
     block = calibration[sensor]
@@ -38,15 +38,21 @@ def summary(calibration: Mapping[str, Any]) -> str:
     lines += ["", "Do not use these values." if rejected else use]
     if block["sigma_mount"]:
         lines += SIGMAS_IN_WORDS[sensor]
+        lines += [] if rejected else ["Use the total sigma."]
     if not block["sigma_mount"] and calibration["result"] != "adjustment":
         lines.append("This method has no sigma of its own; those of the adjustment are in calibration.json.")
-    lines += [f"Free: {parameter['words']}." for parameter in calibration["free"].values()]
+    lines += [line for parameter in calibration["free"].values() for line in wrapped(f"Free: {parameter['words']}.")]
     lines.append(_target_line(calibration["target"]))
     lines += _pass_lines(calibration["passes"], sensor)
     for key in ("weakest", "advice"):
         if calibration["geometry"][key]:
-            lines.append(f"Geometry: {calibration['geometry'][key]}.")
+            lines += wrapped(f"Geometry: {calibration['geometry'][key]}.")
     return "\n".join(lines)
+
+
+def _indented(sentences: Iterable[str]) -> list[str]:
+    """Return sentences in lines, indented, their further lines more so."""
+    return [line for sentence in sentences for line in wrapped(sentence, "  ", "    ")]
 
 
 def _mount_table(calibration: Mapping[str, Any], sensor: str) -> list[str]:
@@ -78,7 +84,7 @@ def _pass_lines(passes: Sequence[Mapping[str, Any]], sensor: str) -> list[str]:
         if row["soundings"] or row["laser_points"]:
             counts = f"{row['soundings']} + {row['laser_points']}" if is_sonar else f"{row['laser_points']}"
             listed.append(f"{row['pass']}: {row['distance_m']:.1f} m {counts}")
-    wrapped = textwrap.wrap(", ".join(listed), 110, initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False)
+    wrapped = textwrap.wrap(", ".join(listed), SCREEN, initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False)
     return [f"Points on the target by pass, distance of the INS from the wall, {points}:", *wrapped]
 
 

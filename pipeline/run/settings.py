@@ -1,6 +1,6 @@
 """Settings of a run. They are read from YAML, kept in run.yaml, and refused if they cannot be correct."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -9,12 +9,13 @@ import yaml
 
 from pipeline.atomic_files import sha256, write_text
 from pipeline.config.about import About
-from pipeline.config.load import load_pool, load_session
+from pipeline.config.fill_in import refuse_unfilled
+from pipeline.config.load import load_pool, load_session, session_yaml, stated_keys
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import Calibrated, Mbes, SessionConfig
 from pipeline.config.stage_settings import settings_by_name
 from pipeline.config.target import Target
-from pipeline.config.yaml_file import SESSION_YAML, read_yaml
+from pipeline.config.yaml_file import SESSION_YAML, read_yaml, text_of
 from pipeline.config.yaml_models import parse
 from pipeline.errors import ArtefactError, ConfigError
 from pipeline.readers.casts import with_cast
@@ -27,13 +28,15 @@ RUN_YAML = "run.yaml"
 class Settings:
     """The checked settings of a run, of the pool and of the session, and the folder with the raw files.
 
-    ``files``: SHA-256 of the files that they were read from, by ``session`` and ``config``. An older run.yaml has none.
+    ``files``: SHA-256 of the files that they were read from, by ``session`` and ``config``; ``stated``: the keys to
+    which these files themselves give a value, by the same names. An older run.yaml has neither.
     """
 
     session_folder: Path
     pool: PoolConfig
     session: SessionConfig
     files: Mapping[str, str] = field(default_factory=dict)
+    stated: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
     def resolved(self) -> dict[str, Any]:
         """Return every setting by the name under which a stage's Config asks for it."""
@@ -66,6 +69,8 @@ def load_settings(session_folder: Path, config_path: Path, calibrated: Calibrate
         "mbes": the sonar. "laser": the laser; a sonar in the session is ignored. None: the sonar if the session has
         one, otherwise the laser.
     """
+    if config_path.is_file():
+        refuse_unfilled({path: text_of(path) for path in (session_yaml(session_folder), config_path)})
     pool = load_pool(config_path)
     try:
         target_of(pool.target)
@@ -80,8 +85,9 @@ def load_settings(session_folder: Path, config_path: Path, calibrated: Calibrate
         raise ConfigError(f"{where}: mbes: is missing; add it (poolcal laser calibrates the laser without a sonar)")
     if session.mbes is not None:
         refuse_shallow_cast(pool.target, session.mbes, session_folder / SESSION_YAML)
-    files = {"session": sha256(session_folder / SESSION_YAML), "config": sha256(config_path)}
-    return Settings(session_folder.resolve(), pool, session, files)
+    paths = {"session": session_folder / SESSION_YAML, "config": config_path}
+    files, stated = ({name: of(path) for name, path in paths.items()} for of in (sha256, stated_keys))
+    return Settings(session_folder.resolve(), pool, session, files, stated)
 
 
 def refuse_unknown_faces(pool: PoolConfig, path: Path) -> None:
@@ -155,6 +161,7 @@ def write_settings(run: Path, settings: Settings) -> None:
     content = {
         "session_folder": str(settings.session_folder),
         "files": dict(settings.files),
+        "stated": {name: list(keys) for name, keys in settings.stated.items()},
         "config": settings.pool.model_dump(mode="json"),
         "session": settings.session.model_dump(mode="json"),
     }
@@ -168,13 +175,17 @@ def read_settings(run: Path) -> Settings:
     if not path.is_file():
         raise ArtefactError(f"{run}: holds no {RUN_YAML}, so it is no run folder; name one of poolcal run's")
     content = read_yaml(path)
-    folder, files = content.get("session_folder"), content.get("files", {})
-    if {*content, "files"} != {"session_folder", "files", "config", "session"} or not isinstance(folder, str):
+    folder, files, stated = content.get("session_folder"), content.get("files", {}), content.get("stated", {})
+    known = {"session_folder", "files", "stated", "config", "session"}
+    if {*content, "files", "stated"} != known or not isinstance(folder, str):
         raise ConfigError(f"{path}: must hold session_folder, config and session; run poolcal run again")
     if not isinstance(files, dict) or not all(isinstance(digest, str) for digest in files.values()):
         raise ConfigError(f"{path}: files: must hold digests of files; run poolcal run again")
+    if not isinstance(stated, dict) or not all(isinstance(keys, list) for keys in stated.values()):
+        raise ConfigError(f"{path}: stated: must hold lists of keys; run poolcal run again")
     pool = parse(PoolConfig, content["config"], f"{path}: config")
-    return Settings(Path(folder), pool, parse(SessionConfig, content["session"], f"{path}: session"), files)
+    session = parse(SessionConfig, content["session"], f"{path}: session")
+    return Settings(Path(folder), pool, session, files, stated)
 
 
 def calibrated_in(run: Path) -> Calibrated:

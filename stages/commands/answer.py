@@ -19,12 +19,17 @@ def print_answer(text: str, is_yes: bool, as_is: bool = False) -> int:
 
 
 def print_result(run: Path) -> int:
-    """Print the result of a run and return the exit status: 1 if it was rejected."""
+    """Print the result of a run, with a note on an assumed drift, and return the exit status: 1 if it was rejected."""
     from pipeline.results.screen import summary
+    from pipeline.run.assumed_drift import assumed_drift
     from pipeline.run.results import calibration
+    from pipeline.run.settings import read_settings
+    from pipeline.text_table import wrapped
 
     result = calibration(run)
-    return print_answer(summary(result), result["verdict"] == "accepted")
+    note = assumed_drift(read_settings(run), bool(result["ins_drift"]["from_files"]))
+    lines = [summary(result), *(wrapped(f"Note: {note}.") if note else ())]
+    return print_answer("\n".join(lines), result["verdict"] == "accepted")
 
 
 def say_where(run: Path) -> None:
@@ -33,9 +38,24 @@ def say_where(run: Path) -> None:
     if page.is_file():
         say(f"Report: {page}", sys.stdout)
     if any(run.glob("*/*.rrd")):
-        program = sys.argv[0] if Path(sys.argv[0]).name == "poolcal" else "poolcal"  # as the user called it
-        place = str(run) if not str(run).startswith("-") else f"./{run}"
-        say(f"Recordings: {program} view {shlex.quote(place)}", sys.stdout)
+        say(f"Recordings: {_command('view', run)}", sys.stdout)
+
+
+def say_next(run: Path) -> None:
+    """Print what comes after an accepted calibration of the sonar: entering its values, and proving that."""
+    lines = [
+        "Next: enter the values in your survey software (poolcal export --list shows all), and prove that they are right:",
+        f"  {_command('export', run)} --to NAME",
+        f"  {_command('check-entry', run)} SOUNDINGS",
+    ]
+    say("\n".join(lines), sys.stdout)
+
+
+def _command(name: str, run: Path) -> str:
+    """Return a command on a run, quoted for the shell, with the program as the user called it."""
+    program = sys.argv[0] if Path(sys.argv[0]).name == "poolcal" else "poolcal"
+    place = str(run) if not str(run).startswith("-") else f"./{run}"
+    return f"{shlex.quote(program)} {name} {shlex.quote(place)}"
 
 
 def say_failures(failures: "Sequence[DrawingFailure]", but: str = "") -> None:

@@ -14,6 +14,7 @@ from pipeline.config.session import SessionConfig
 from pipeline.errors import PoolcalError
 from pipeline.readers.casts import with_cast
 from pipeline.report.cast_checks import describe_cast
+from pipeline.run.assumed_drift import assumed_drift
 from pipeline.run.settings import load_settings
 from stages.commands.answer import print_answer
 from stages.in_memory import calibrate_in_memory
@@ -36,12 +37,14 @@ def command(session: Path, config: Path | None, as_json: bool) -> int:
     settings = None if config is None else load_settings(session, config, None)
     content, pool = (load_session(session, with_cast), None) if settings is None else (settings.session, settings.pool)
     findings = check_session(session, content, pool, _calibrated)
+    from_files = bool(findings.quality.sigmas)
+    note = "" if settings is None else assumed_drift(settings, from_files)
     if as_json:
-        return print_answer(rendering.check_json(findings), not findings.faulty, as_is=True)
+        return print_answer(rendering.check_json(findings, note), not findings.faulty, as_is=True)
     used = None if content.mbes is None else content.mbes.svp_from
     cast = "" if used is None else f"mbes.svp: {describe_cast(used)}\n\n"
     unasked = "" if pool is not None else f"\n{WITHOUT_CONFIG}"
-    return print_answer(f"{cast}{rendering.check_text(findings)}{unasked}", not findings.faulty)
+    return print_answer(f"{cast}{rendering.check_text(findings, note)}{unasked}", not findings.faulty)
 
 
 def _calibrated(session: SessionConfig, pool: PoolConfig, raw: Raw) -> TrialCalibration:

@@ -8,7 +8,7 @@ from pipeline.run import runner
 from pipeline.run.progress import Progress
 from pipeline.run.workers import workers
 from stages import load
-from stages.commands.answer import print_result, say_failures, say_where
+from stages.commands.answer import print_result, say_failures, say_next, say_where
 from stages.commands.draw import Drawings, draw_missing
 from stages.commands.entry import raise_if_interrupted
 
@@ -71,4 +71,6 @@ def calibrate(session: Path, config: Path, run: Path, calibrated: Calibrated, op
     say_failures(failures, "; the calibration is complete")
     raise_if_interrupted()
     say_where(run)
+    if status == 0 and calibrated == "mbes":
+        say_next(run)
     return Done(status, ran, [failure.kind for failure in failures])

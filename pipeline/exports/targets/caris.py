@@ -40,7 +40,7 @@ _SHEET = Sheet(
         "the same angles in both.",
         "TPU Values, 1 sigma: MRU Align StdDev Gyro: sigma of Yaw; MRU Align StdDev Roll/Pitch: the larger one of Roll "
         "and Pitch; Offset X, Offset Y, Offset Z (Other Standard Deviations): sigma of X, Y, Z. Trans Roll (Sensor "
-        "Offsets) is the Roll above; MRU to Trans and Navigation to Trans count from the MRU and from the antenna.",
+        "Offsets) is the Roll above; MRU to Trans and Navigation To Trans count from the MRU and from the antenna.",
     ),
 )
 TARGET = _SHEET.target("caris", "CARIS HIPS vessel editor", CONVENTION)

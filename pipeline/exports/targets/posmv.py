@@ -10,7 +10,7 @@ from pipeline.exports.sheet import Sheet
 _SHEET = Sheet(
     groups=(
         (
-            "Settings, Installation, Lever Arms & Mounting Angles: Ref. to Sensor 1 Lever Arm",
+            "Settings, Installation, where sensor 1 stands: Ref. to Sensor 1 Lever Arm",
             {"x": "Lever arm X", "y": "Lever arm Y", "z": "Lever arm Z"},
         ),
         ("Sensor 1 Frame w.r.t. Ref. Frame", {"roll": "Angle X", "pitch": "Angle Y", "yaw": "Angle Z"}),

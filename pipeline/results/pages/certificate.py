@@ -15,9 +15,11 @@ from pipeline.console import plural
 from pipeline.maths.survey.sounding_uncertainty import ORDERS, table_of_soundings
 from pipeline.mount import WITHIN_95, mount_of
 from pipeline.report.method_blocks import mounted_of
+from pipeline.results.pages.assumptions import assumed_groups
 from pipeline.results.pages.mount_tables import POSITIVE, Quantity
 from pipeline.results.pages.sign_drawing import sign_drawings
 from pipeline.run import manifest
+from pipeline.run.origins import is_recorded
 from pipeline.run.results import Tables
 from pipeline.run.settings import Settings
 
@@ -78,6 +80,8 @@ def certificate_values(
         "soundings": _soundings(block["covariance_total"]) if sonar and block["covariance_total"] else None,
         "done": _done(result, sonar),
         "speed": _speed(tables.table(PASSES)),
+        "assumed": list(assumed_groups(settings, bool(result["ins_drift"]["from_files"]))),
+        "assumed_recorded": is_recorded(settings),
         "digests": _digests(manifests, result, settings),
     }
 

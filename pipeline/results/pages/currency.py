@@ -27,7 +27,7 @@ def page_digest(run: Path, manifests: Mapping[str, manifest.Manifest]) -> str:
     """
     shown = [[stage, of_stage.outputs, of_stage.key.raw] for stage, of_stage in manifests.items()]
     settings = read_settings(run)
-    content = [shown, settings.as_json(), dict(settings.files), _drawn_by(), language()]
+    content = [shown, settings.as_json(), dict(settings.files), dict(settings.stated), _drawn_by(), language()]
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 

@@ -8,6 +8,9 @@ import pandas as pd
 from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.offsetbox import AnnotationBbox, DrawingArea
+from matplotlib.patches import FancyArrow
+from matplotlib.text import Text
 from matplotlib.ticker import FixedLocator, MaxNLocator
 from numpy.typing import NDArray
 
@@ -19,6 +22,7 @@ from pipeline.results.pages.target_plots import MOST_PANELS, XYZ
 
 Array = NDArray[np.float64]
 MAP_HEIGHT_IN = 2.9
+ROSE_PT = 56.0  # size of the arrow to north with its letter
 
 
 def residual_maps(residual_map: pd.DataFrame, faces: pd.DataFrame, sensor: str) -> Markup:
@@ -132,14 +136,24 @@ def pass_tracks(positions_m: Mapping[int, Array], faces: pd.DataFrame, azimuth_d
         axis.plot(track[:, 1], track[:, 0], color=SONAR, linewidth=0.9)
         axis.annotate(f"{number}", (track[-1, 1], track[-1, 0]), (4, 0), textcoords="offset points", va="center")
         axis.plot(*track[0, [1, 0]], ".", color=SONAR, markersize=4)
-    rose = figure.add_axes((0.87, 0.4, 0.12, 0.24))
-    rose.axis("off")
-    rose.set(xlim=(-1.4, 1.4), ylim=(-1.4, 1.4), aspect="equal")
-    along, down = np.cos(np.radians(azimuth_deg)), -np.sin(np.radians(azimuth_deg))  # components of north along y and x
-    rose.arrow(-along, down, 1.6 * along, -1.6 * down, color=QUIET, width=0.02, head_width=0.25)
-    rose.annotate("N", (1.25 * along, -1.25 * down), ha="center", va="center")
+    _point_north(axis, azimuth_deg)
     axis.set(xlabel="y, along the target, m", ylabel="x, into it, m", aspect="equal")
     axis.set_title("tracks of the passes (dot: start) and the target, from above")
     axis.invert_yaxis()  # seen from above with y to the right, x runs down
     axis.margins(0.08)
     return picture(figure, "plan of the passes before the target")
+
+
+def _point_north(axis: Axes, azimuth_deg: float) -> None:
+    """Draw an arrow to north beside the right edge of a plan with y to the right and x down."""
+    half = ROSE_PT / 2
+    along, up = np.cos(np.radians(azimuth_deg)), np.sin(np.radians(azimuth_deg))  # components of north to right and up
+    box = DrawingArea(ROSE_PT, ROSE_PT)
+    tail, length = 0.7 * half, 1.1 * half
+    shape: dict[str, Any] = {"width": 0.6, "head_width": 5.0, "color": QUIET, "length_includes_head": True}
+    box.add_artist(FancyArrow(half - tail * along, half - tail * up, length * along, length * up, **shape))
+    place: dict[str, Any] = {"ha": "center", "va": "center"}
+    box.add_artist(Text(half + 0.75 * half * along, half + 0.75 * half * up, "N", **place))
+    axis.add_artist(
+        AnnotationBbox(box, (1.0, 0.5), xycoords="axes fraction", box_alignment=(0.0, 0.5), frameon=False, pad=0.0)
+    )

@@ -1,56 +1,83 @@
-"""The report's table of instruments: the figures that weight the observations, and the origin of each."""
+"""The report's table of instruments: the figures on which values and uncertainties rest, and the origin of each."""
 
-from collections.abc import Mapping
-from functools import reduce
+from collections.abc import Iterator, Mapping
 from typing import Any
 
-from pydantic import BaseModel
-
 from pipeline.config.instruments import SENSORS, figures
-from pipeline.config.session import Ins, Laser, Mbes, SessionConfig
+from pipeline.config.pool import AsBuilt, LaserFit
+from pipeline.run.origins import origin_of, preset_of, value_of
+from pipeline.run.settings import Settings
 
 Row = Mapping[str, Any]
+BESIDE: Mapping[str, tuple[str, ...]] = {  # keys that no preset may set
+    "ins": ("drift_within.sigmas", "drift_within.time_constant"),
+    "laser": ("latency_sigma_s",),
+    "mbes": ("sound_speed_sigma_m_s", "sound_speed_gradient_sigma_1_s", "latency_sigma_s"),
+}
+OF_FILES = "the INS's files"
 
 
-def instrument_rows(session: SessionConfig) -> list[Row]:
+def instrument_rows(settings: Settings, drift: Mapping[str, Any]) -> list[Row]:
     """Return one row for each figure. The first row of a sensor has the names of the sensor and of its instrument.
 
-    Without a preset, the origin of a value that equals the default is the default.
+    Parameters
+    ----------
+    settings
+        The run's settings.
+    drift
+        The block ``ins_drift`` of calibration.json: the drift's figures that were used.
     """
     rows: list[Row] = []
-    for sensor, model in SENSORS.items():
-        block: Ins | Laser | Mbes | None = getattr(session, sensor)
-        if block is None:
+    for sensor in SENSORS:
+        if getattr(settings.session, sensor) is None:
             continue
-        preset = block.instrument
-        for number, key in enumerate(figures(sensor)):
-            value, default = _at(block, key), _at(model.model_fields, key)
-            origin = preset.origins.get(key, "default") if preset else "default" if value == default else "session"
+        preset = preset_of(settings, sensor)
+        for number, (key, value, origin) in enumerate(_figures(settings, sensor, drift)):
+            of_preset = preset is not None and origin.startswith("preset")
             rows.append(
                 {
                     "sensor": "" if number else sensor,
                     "instrument": "" if number else preset.title if preset else "–",
                     "key": key,
-                    "value": _shown(value),
+                    "value": value,
                     "origin": origin,
-                    "unverified": preset is not None and origin == "preset" and key in preset.unverified,
+                    "unverified": of_preset and preset is not None and key in preset.unverified,
                 }
             )
+    block, model = ("as_built", AsBuilt) if settings.session.calibrated == "mbes" else ("laser_fit", LaserFit)
+    for number, name in enumerate(name for name in model.model_fields if "sigma" in name):
+        key = f"{block}.{name}"
+        row = {"key": key, "value": _shown(value_of(settings, key)), "origin": origin_of(settings, key)}
+        first = {"sensor": "" if number else "target", "instrument": "" if number else "–"}
+        rows.append(first | row | {"unverified": False})
     return rows
 
 
-def _at(start: Any, key: str) -> Any:
-    """Return the value of a model at a dotted key, or, if ``start`` holds a model's fields, the default at this key."""
+def _figures(settings: Settings, sensor: str, drift: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
+    """Yield key, value in words, and origin of each figure of a sensor."""
+    for key in [*figures(sensor), *_beside(settings, sensor)]:
+        if key.startswith("drift.") and key.removeprefix("drift.") in drift["from_files"]:
+            yield key, _shown(drift[key.removeprefix("drift.")]), OF_FILES
+        else:
+            yield key, _shown(value_of(settings, f"{sensor}.{key}")), origin_of(settings, f"{sensor}.{key}")
 
-    def step(block: Any, name: str) -> Any:
-        return getattr(block, name) if isinstance(block, BaseModel) else block[name].get_default()
 
-    return reduce(step, key.split("."), start)
+def _beside(settings: Settings, sensor: str) -> tuple[str, ...]:
+    """Return the keys of a sensor's further figures: of its mount, of a cast, of its clock."""
+    more: tuple[str, ...] = ()
+    if sensor == "laser" and settings.session.calibrated == "mbes":
+        covariance = settings.session.laser.mount_covariance
+        more = ("mount_sigma.angle_deg", "mount_sigma.lever_arm_m") if covariance is None else ("mount_covariance",)
+    if sensor == "mbes" and settings.session.sonar.svp is not None:
+        more = ("svp_sigma_m_s",)
+    return more + BESIDE[sensor]
 
 
-def _shown(value: float | tuple[float, ...] | None) -> str:
+def _shown(value: Any) -> str:
     if value is None:
         return "–"
+    if isinstance(value, tuple) and isinstance(value[0], tuple):
+        return f"{len(value)} × {len(value[0])}"
     words = {True: "yes", False: "no"}
     numbers = value if isinstance(value, tuple) else (value,)
     return ", ".join(words[number] if isinstance(number, bool) else f"{number:g}" for number in numbers)

@@ -29,20 +29,24 @@ from pipeline.config.changes import changed_settings
 from pipeline.config.target import Letters
 from pipeline.gps_time import utc_text
 from pipeline.maths.mount_parameters import PARAMETERS
+from pipeline.maths.target.family_words import families_in_words
 from pipeline.report.as_built import design_shape
 from pipeline.report.reason_codes import verdict_in_words
 from pipeline.report.sigma_sources import contributions, laser_correlates
 from pipeline.results.pages.certificate import certificate_values
 from pipeline.results.pages.currency import page_digest
+from pipeline.results.pages.drift_words import drift_rows, drift_sentence
 from pipeline.results.pages.instrument_table import instrument_rows
 from pipeline.results.pages.limiting_errors import limiting_sentences
 from pipeline.results.pages.mount_tables import METHODS, correlation_rows, method_rows, parameter_rows, part_rows
 from pipeline.results.pages.parameter_tests import parameter_test_rows, untold_parameters
+from pipeline.results.pages.patent_check import patent_check
 from pipeline.results.pages.plane_tables import as_built_rows, plane_agreement_rows
 from pipeline.results.pages.plots import picture_names
 from pipeline.results.pages.rendering import render_page
 from pipeline.results.pages.sigma_sources import sigma_source_rows, slot_checks
 from pipeline.run import manifest
+from pipeline.run.origins import DEFAULT, POOL, SESSION, origin_of
 from pipeline.run.results import PAGE, Tables, agreeing, calibration
 from pipeline.run.settings import Settings, read_settings
 from pipeline.target.design import target_of
@@ -99,7 +103,7 @@ def report_page(tables: Tables, manifests: Mapping[str, manifest.Manifest], pict
         laser=settings.session.calibrated == "laser",
         **_result_values(tables, manifests, result, settings),
         **_residual_values(tables, result, settings),
-        **_data_values(tables, manifests, settings),
+        **_data_values(tables, manifests, result, settings),
         drawn_from=page_digest(tables.run, manifests),
         pictures=dict(zip(picture_names(tables.run), pictures, strict=True)),
     )
@@ -132,6 +136,8 @@ def _result_values(
         "speeds": _speeds(tables.table(FILES)),
         "letters": isinstance(settings.pool.target, Letters),
         "solved_methods": [method for method in methods if result["methods"][method]["mount"]],
+        "patent_check": "" if laser else patent_check(result["methods"]),
+        "faces_in_words": families_in_words(target_of(settings.pool.target)),
         "by_method": [] if laser else list(method_rows(calibrations)),
         "planes": planes,
         "several_planes": list(dict.fromkeys(row["plane"] for row in planes if np.isnan(row["angle_deg"]))),
@@ -153,12 +159,15 @@ def _residual_values(tables: Tables, result: Row, settings: Settings) -> Row:
         "untold": untold_parameters(tables.table(FREED)),
         "parameter_tests": list(parameter_test_rows(tables.table(FREED), settings.pool.adjust.test_level)),
         "groups": tables.table(GROUPS).to_dict("records"),
-        "drift_figures": [row for row in tables.table(DRIFT_FIGURES).to_dict("records") if row["sigma_log"]],
+        "drift_figures": drift_rows(tables.table(DRIFT_FIGURES)),
+        "drift_in_words": drift_sentence(tables.table(DRIFT_FIGURES)),
         "summary": tables.table(ADJUST_SUMMARY).to_dict("records")[0],
     }
 
 
-def _data_values(tables: Tables, manifests: Mapping[str, manifest.Manifest], settings: Settings) -> Row:
+def _data_values(
+    tables: Tables, manifests: Mapping[str, manifest.Manifest], result: Row, settings: Settings
+) -> Row:
     """Return the template's values about passes, files, counts, settings and provenance."""
     gaps = tables.table(GAPS).sort_values("duration_s", ascending=False)
     counts = [row | {"stage": stage} for stage, of_stage in manifests.items() for row in of_stage.counts]
@@ -168,7 +177,7 @@ def _data_values(tables: Tables, manifests: Mapping[str, manifest.Manifest], set
         "gaps": gaps.head(MOST_GAPS).to_dict("records"),
         "more_gaps": max(0, len(gaps) - MOST_GAPS),
         "counts": [row for row in counts if row["count"]],
-        "figures": instrument_rows(settings.session),
+        "figures": instrument_rows(settings, result["ins_drift"]),
         "changed": _changed(settings),
         "commit": manifests["report"].git_commit,
         "utc": lambda t_ns: utc_text(int(t_ns))[:19].replace("T", " "),
@@ -198,9 +207,28 @@ def _changed(settings: Settings) -> list[dict[str, str]]:
         return value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
 
     rows = [
-        {"where": where, "key": key, "default": "" if default is None else shown(default), "value": shown(value)}
-        for where, model in (("pool", settings.pool), ("session", settings.session))
+        {
+            "origin": _origin(settings, key),
+            "key": key,
+            "default": "" if default is None else shown(default),
+            "value": shown(value),
+        }
+        for model in (settings.pool, settings.session)
         for key, default, value in changed_settings(model)
         if ".instrument." not in key and not key.startswith("about.")  # these stand elsewhere on the page
     ]
     return sorted(rows, key=lambda row: not row["default"])
+
+
+def _origin(settings: Settings, key: str) -> str:
+    """Return where a value that is not the default comes from; the program sets some, such as those of a cast's file.
+
+    A list of blocks, or a block whose keys are free names, is given as a whole.
+    """
+    origin = origin_of(settings, key)
+    if origin != DEFAULT:
+        return origin
+    stated = [one for keys in settings.stated.values() for one in keys]
+    given = any(one.startswith(f"{key}.") or key.startswith(f"{one}.") for one in stated)
+    file = SESSION if key.partition(".")[0] in type(settings.session).model_fields else POOL
+    return file if given else "set by poolcal"

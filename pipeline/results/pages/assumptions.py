@@ -1,0 +1,90 @@
+"""What enters the stated uncertainty though nobody stated it: defaults of the program, in words for the certificate."""
+
+from collections.abc import Iterator, Mapping
+
+from pipeline.config.session import SessionConfig
+from pipeline.run.origins import is_assumed, value_of
+from pipeline.run.settings import Settings
+
+OF_INS = {
+    "ins.drift.horizontal_m": "horizontal {} mm",
+    "ins.drift.vertical_m": "vertical {} mm",
+    "ins.drift.roll_pitch_deg": "roll and pitch {}°",
+    "ins.drift.heading_deg": "heading {}°",
+    "ins.drift.time_constant_s": "time constant {} s",
+}
+OF_LASER = {
+    "laser.range_bias_sigma_m": "all of the laser {} mm",
+    "laser.incidence_bias_sigma_m": "of the laser at 45° incidence {} mm",
+}
+OF_SONAR = {
+    "mbes.range_bias_sigma_m": "all of the sonar {} mm",
+    "mbes.incidence_bias_sigma_m": "of the sonar at 45° incidence {} mm",
+    "mbes.level_bias_sigma_m": "of the sonar on horizontal faces {} mm",
+}
+TARGET = {
+    "as_built.face_sigma_m": "single faces {} mm",
+    "as_built.offset_sigma_m": "wet faces against dry ones {} mm",
+    "as_built.angle_sigma_deg": "their angle {}°",
+    "as_built.bow_sigma_m": "their bow {} mm",
+}
+LASER_FIT = {
+    "laser_fit.face_sigma_deg": "directions of its faces {}°",
+    "laser_fit.face_sigma_m": "distances of its faces {} mm",
+    "laser_fit.plumb_sigma_deg": "out of plumb {}°",
+}
+COARSE = {"laser_fit.coarse_sigma_deg": "angles {}°", "laser_fit.coarse_sigma_m": "lever arm {} mm"}
+MOUNT = {"laser.mount_sigma.angle_deg": "angles {}°", "laser.mount_sigma.lever_arm_m": "lever arm {} mm"}
+SOUND_SPEED = {
+    "mbes.sound_speed_sigma_m_s": "{} m/s",
+    "mbes.sound_speed_gradient_sigma_1_s": "{} m/s per metre of depth",
+}
+CAST = {"mbes.svp_sigma_m_s": "each speed of the cast {} m/s"}
+CLOCKS = {"laser.latency_sigma_s": "of the laser {} ms", "mbes.latency_sigma_s": "of the sonar {} ms"}
+IN_THOUSANDTHS = ("_m", "latency_sigma_s")  # ends of keys that are shown in mm or ms
+
+
+def assumed_groups(settings: Settings, drift_from_files: bool) -> Iterator[str]:
+    """Yield in words each group of figures that enter the total sigmas and that neither a file nor a preset gave.
+
+    Figures that the data correct by their variance factors (noise of ranges, of angles, of the INS's records) are none.
+
+    Parameters
+    ----------
+    settings
+        The run's settings.
+    drift_from_files
+        Whether the INS's files gave the sigmas of the drift. The time constant is never theirs.
+    """
+    for words, keys in _groups(settings.session).items():
+        assumed = {key: form for key, form in keys.items() if is_assumed(settings, key)}
+        if drift_from_files and keys is OF_INS:
+            assumed = {key: form for key, form in assumed.items() if key.endswith("_s")}
+        if assumed:
+            yield f"{words} ({', '.join(form.format(_number(settings, key)) for key, form in assumed.items())})"
+
+
+def _groups(session: SessionConfig) -> Mapping[str, Mapping[str, str]]:
+    """Return by the words of each group its figures that enter the sigmas of this calibration: keys and their words."""
+    laser, mbes = session.laser, session.mbes
+    if mbes is None:
+        of_coarse = COARSE if laser.mount_covariance is None else {}
+        clock = {key: form for key, form in CLOCKS.items() if key.startswith("laser")}
+        mount, target, ranges, speed, place = {"the coarse mount": of_coarse}, LASER_FIT, OF_LASER, {}, {}
+    else:
+        clock, target, ranges = CLOCKS, TARGET, OF_LASER | OF_SONAR
+        mount = {"the laser's own mount": MOUNT if laser.mount_covariance is None else {}}
+        speed, place = SOUND_SPEED | (CAST if mbes.svp else {}), {"mbes.projector_sigma_m": "{} mm"}
+    return {
+        "slow errors of the INS": OF_INS,
+        **mount,
+        "clocks": clock,
+        "ranges": ranges,
+        "sound speed": speed,
+        "place of the transmitter in the sonar": place,
+        "the target as built": target,
+    }
+
+
+def _number(settings: Settings, key: str) -> str:
+    return f"{value_of(settings, key) * (1000 if key.endswith(IN_THOUSANDTHS) else 1):g}"
