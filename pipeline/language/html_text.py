@@ -55,7 +55,7 @@ class _Page(HTMLParser):
         for name, value in attrs:
             if name in SPOKEN and value:
                 spoken = f'{name}="{escape(translated(value))}"'
-                raw = raw.replace(f'{name}="{escape(value)}"', spoken).replace(f'{name}="{value}"', spoken)
+                raw = re.sub(rf'\b{name}="[^"]*"', lambda _, spoken=spoken: spoken, raw, count=1)
         self.parts.append(raw)
         if tag not in VOID and (self.left or tag in LEFT or ("translate", "no") in attrs):
             self.left.append(tag)

@@ -16,7 +16,9 @@ from functools import lru_cache
 
 PLACE = re.compile(r"\{(\d+)\}")
 WORD = re.compile(r"[A-Za-z]{2,}")
-PLAIN = re.compile(r"(?<![\w./:=-])[a-z]{2,}(?![\w/:=-]|\.\w)")  # a word of a sentence: no part of a path or of a key
+PLAIN = re.compile(  # a word of a sentence: no unit, and no part of a path or of a key
+    r"(?<![\w./:=-])(?!(?:mm|cm|km|ms|min|deg)\b)[a-z]{2,}(?![\w/:=-]|\.\w)"
+)
 BREAKS = {  # where a text may be taken apart, coarse ones first, and what stands there then
     "\n": "\n", ". ": "。", "; ": "；", ": ": "：", ", ": "，", " and ": "、", " or ": "或",
 }  # fmt: skip

@@ -62,14 +62,16 @@ def test_a_check_with_findings(place: Place) -> None:
     assert_chinese(screen(told), place.folder)
 
 
-def test_two_runs_and_many(done: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_two_runs_and_many(done: Place, undisturbed: tuple[Path, Told], monkeypatch: pytest.MonkeyPatch) -> None:
+    done.edit_config("verdict", max_sigma_deg=0.06)
+    assert done.calibrate().status == 0
     pictures = watch_pictures(monkeypatch)
     folder = done.folder / "runs"
     for day, shift in enumerate((0.0, 0.0, 0.06, 0.06), 1):
         planted(folder, done.run, f"run{day}", day, z_m=shift)
     planted(folder, done.run, "refused", 5, verdict="rejected", nothing=True)
     page = done.folder / "diff.html"
-    texts = screen(poolcal("diff", folder / "run1", folder / "run3", "--html", page))
+    texts = screen(poolcal("diff", undisturbed[0], done.run, "--html", page))
     texts += screen(poolcal("history", folder)) + texts_of_page(folder / "history" / "history.html")
     texts += texts_of_page(page) + (pictures if fonts_of("zh") else [])
     assert_chinese(texts, done.folder, "run1", "run2", "run3", "run4", "refused")
