@@ -48,10 +48,10 @@ class Catalogue:
         self._by_word: dict[str, list[str]] = defaultdict(list)
         counts: dict[str, int] = defaultdict(int)
         for key in self._patterns:
-            for word in set(WORD.findall(PLACE.sub(" ", key))):
+            for word in set(WORD.findall(PLACE.sub(" ", key).lower())):
                 counts[word] += 1
         for key in self._patterns:
-            words = WORD.findall(PLACE.sub(" ", key))
+            words = WORD.findall(PLACE.sub(" ", key).lower())
             rarest = min(words, key=lambda word: (counts[word], word))
             self._by_word[rarest].append(key)
         self.translated = lru_cache(maxsize=20_000)(self._translated)
@@ -74,6 +74,8 @@ class Catalogue:
         for mark in ("\n", ". "):
             if mark in core.strip(mark):
                 first, second = core.split(mark, 1)
+                if mark == ". " and (found := self._whole(f"{first}.")) is not None:  # an entry with its full stop
+                    return f"{found}{self.translated(second)}"
                 return f"{self.translated(first)}{BREAKS[mark]}{self.translated(second)}"
         taken_apart = self._taken_apart(core)
         left, words = len(PLAIN.findall(taken_apart)), len(PLAIN.findall(core))
@@ -119,7 +121,7 @@ class Catalogue:
         return best[2] if best else None
 
     def _candidates(self, core: str) -> Iterator[str]:
-        for word in dict.fromkeys(WORD.findall(core)):
+        for word in dict.fromkeys(WORD.findall(core.lower())):
             yield from self._by_word.get(word, ())
 
 

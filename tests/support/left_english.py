@@ -31,7 +31,7 @@ SAME = {  # words that are the same in every language
     ),
 }
 WORDS = {word for group in SAME.values() for word in group.split()}
-FORMULAS = ("R = Rz(yaw) · Rx(pitch) · Ry(roll)", "Exp(correction) · coarse", "Special Order", "Exclusive Order", "patch test", "CN 105425246 B", "json：held")
+FORMULAS = ("R = Rz(yaw) · Rx(pitch) · Ry(roll)", "Exp(correction) · coarse", "Special Order", "Exclusive Order", "patch test", "CN 105425246 B", "calibration.json：held")
 KEYS = re.compile(  # keys, file names, commands: written as the files and the shell have them
     r"S-44|SHA-256|sha256sum|INS_[A-Z]+|open3d-cpu|[\w-]*(?:[._/][\w*<>-]+)+[._/]?|[a-z]+_[a-z_]+|--[a-z][a-z-]*|[0-9a-f]{8,}|https?://\S+|RUN|SESSION|NAME|SOUNDINGS|poolcal [a-z-]+"
 )
