@@ -15,7 +15,6 @@ from pipeline.maths.target.family_words import families_in_words
 from pipeline.maths.target.model import names_in_order
 from pipeline.text_table import text_table, wrapped
 
-
 OF_PASSES = (
     "From, seconds, distance and speed are of the part of a pass beside the target; in the report they are of the "
     "whole pass, which begins earlier."

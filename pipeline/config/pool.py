@@ -11,7 +11,6 @@ from pydantic import Field, field_validator, model_validator
 from pipeline.config.quantities import Model, NotNegative, Positive, SigmaDeg, SigmaM
 from pipeline.config.target import Origin, Target
 
-
 FARTHEST = 1.5  # farthest correction of the coarse mount that is accepted, in units of segment.search_mount_...
 
 

@@ -1,4 +1,4 @@
-"""In Chinese nothing stays English: report, certificate, pictures and screen of runs, laser runs, check, diff, history."""
+"""In Chinese nothing stays English: pages, pictures and screen of runs, laser runs, check, diff and history."""
 
 from pathlib import Path
 

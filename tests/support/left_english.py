@@ -20,20 +20,26 @@ SAME = {  # words that are the same in every language
     "units": "deg m mm cm km s ms min h Hz dB kn ppm UTC GPS TAI",
     "axes, symbols and formulas": "x y z a b c e w t H P1 P2 P3 R_z cos sin exp",
     "names of the field": (
-        "INS IMU GNSS RTK PPK MBES LiDAR RANSAC WGS84 WGS ITRF CGCS2000 EGM2008 TVU THU DVL TPU IHO S-44 NED ENU Helmert"
+        "INS IMU GNSS RTK PPK MBES LiDAR RANSAC WGS84 WGS ITRF CGCS2000 EGM2008 "
+        "TVU THU DVL TPU IHO S-44 NED ENU Helmert"
     ),
     "stages, by the names of their folders and commands": "ingest georeference segment adjust offsets report",
     "words that surveyors use as they are": "ping",
     "values in the files": "null true false",
     "products and standards": (
-        "poolcal Qinsy Qimera QPS CARIS HIPS HYPACK SIS Kongsberg R2Sonic SBET RIEGL LAS LAZ XTF PCAP Rerun Chromium GB "
+        "poolcal Qinsy Qimera QPS CARIS HIPS HYPACK SIS Kongsberg R2Sonic SBET RIEGL LAS LAZ XTF PCAP Rerun "
+        "Chromium GB "
         "Parquet JSON YAML CSV PDF SVG Python SHA SHA-256 dask PosMv POSPac NovAtel"
     ),
 }
 WORDS = {word for group in SAME.values() for word in group.split()}
-FORMULAS = ("R = Rz(yaw) · Rx(pitch) · Ry(roll)", "Exp(correction) · coarse", "Special Order", "Exclusive Order", "patch test", "CN 105425246 B", "calibration.json：held")
+PHRASES = (  # formulas, names of orders and of a procedure that stand in brackets behind the Chinese, a patent, a key
+    "R = Rz(yaw) · Rx(pitch) · Ry(roll)", "Exp(correction) · coarse", "Special Order", "Exclusive Order", "patch test",
+    "CN 105425246 B", "calibration.json：held",
+)  # fmt: skip
 KEYS = re.compile(  # keys, file names, commands: written as the files and the shell have them
-    r"S-44|SHA-256|sha256sum|INS_[A-Z]+|open3d-cpu|[\w-]*(?:[._/][\w*<>-]+)+[._/]?|[a-z]+_[a-z_]+|--[a-z][a-z-]*|[0-9a-f]{8,}|https?://\S+|RUN|SESSION|NAME|SOUNDINGS|poolcal [a-z-]+"
+    r"S-44|SHA-256|sha256sum|INS_[A-Z]+|[\w-]*(?:[._/][\w*<>-]+)+[._/]?|[a-z]+_[a-z_]+|--[a-z][a-z-]*|[0-9a-f]{8,}"
+    r"|https?://\S+|RUN|SESSION|NAME|SOUNDINGS|poolcal [a-z-]+"
 )
 ENGLISH = re.compile(r"(?<![\w.-])[A-Za-z][A-Za-z'’-]+")
 
@@ -101,7 +107,7 @@ def english_of(texts: Iterable[str], data: Iterable[str] = ()) -> Iterator[tuple
     data
         Names that the session gives, such as that of the run folder.
     """
-    names = sorted({*data, *FORMULAS}, key=len, reverse=True)
+    names = sorted({*data, *PHRASES}, key=len, reverse=True)
     for text in dict.fromkeys(texts):
         rest = text
         for name in names:
