@@ -107,7 +107,7 @@ def numbered(text: str, places: str = r"\{[a-z_]*(?::[^{}]*)?\}") -> str:
 def template_texts(source: str) -> Iterator[str]:
     """Yield the texts between the tags of a template, with each combination of the conditions in them."""
     source = re.sub(r"<style.*?</style>|\{#.*?#\}", "", source, flags=re.DOTALL)
-    source = re.sub(r"\{%-?\s*(?!if|elif|else|endif)[^%]*%\}", "<>", source)
+    source = re.sub(r"\{%-?\s*(?!\s|if|elif|else|endif)[^%]*%\}", "<>", source)
     for piece in re.split(r"<(?!wbr)[^>]*>", source):
         for text in _alternatives(piece.strip()):
             text = " ".join(numbered(text, r"\{\{.*?\}\}").split())
@@ -122,7 +122,7 @@ def _alternatives(piece: str) -> Iterator[str]:
         return
     found = re.search(r"\{% if [^%]*%\}((?:(?!\{% if|\{% endif).)*)\{% endif %\}", piece, re.DOTALL)
     if found is None:
-        yield piece
+        yield from re.split(r"\{%.*?%\}", piece)  # the whole piece, unless its conditions end in another one
         return
     branches = re.split(r"\{% el(?:se|if)[^%]*%\}", found[1])
     for branch in dict.fromkeys([*branches, *([""] if "{% else" not in found[0] else [])]):

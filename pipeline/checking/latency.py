@@ -44,11 +44,12 @@ def latency_findings(freed: pd.DataFrame) -> Iterator[Finding]:
             )
             return
     for sensor, (seconds, sigma) in latencies.items():
+        name, setting = f"{sensor}_latency", f"{sensor}.latency_s"
         yield Finding(
             "latency",
             f"{sensor}: its clock is {_offset(seconds)} the INS's ({_between(seconds, sigma)}), as the target's planes "
-            f"sway with the boat: find what delays it; for its amount run with adjust.free: [{sensor}_latency], which "
-            f"uses all the points, and add what that finds to {sensor}.latency_s",
+            f"sway with the boat: find what delays it; for its amount run with adjust.free: [{name}], which "
+            f"uses all the points, and add what that finds to {setting}",
         )
 
 

@@ -4,6 +4,7 @@ Elements with ``translate="no"``, code, styles and pictures are left as they are
 of the standard library, and put together again with all other characters unchanged.
 """
 
+import re
 from html import escape, unescape
 from html.parser import HTMLParser
 
@@ -25,6 +26,11 @@ def translated_page(page: str) -> str:
     return "".join(reader.parts).replace('<html lang="en">', f'<html lang="{language()}">', 1)
 
 
+def _on_one_line(text: str) -> str:
+    """Return a text as a browser shows it: every run of blanks and ends of lines is one blank."""
+    return re.sub(r"[ \t\r\n]+", " ", unescape(text))
+
+
 class _Page(HTMLParser):
     """Parts of a page as they come, texts translated. A text goes on over ``<wbr>``."""
 
@@ -37,7 +43,7 @@ class _Page(HTMLParser):
     def end_text(self) -> None:
         """Write the text that has been read."""
         if self.text:
-            self.parts.append(self.text if self.left else escape(translated(unescape(self.text)), quote=False))
+            self.parts.append(self.text if self.left else escape(translated(_on_one_line(self.text)), quote=False))
         self.text = ""
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
@@ -49,7 +55,7 @@ class _Page(HTMLParser):
         for name, value in attrs:
             if name in SPOKEN and value:
                 spoken = f'{name}="{escape(translated(value))}"'
-                raw = raw.replace(f'{name}="{escape(value)}"', spoken).replace(f'{name}="{value}"', spoken)
+                raw = re.sub(rf'\b{name}="[^"]*"', lambda _, spoken=spoken: spoken, raw, count=1)
         self.parts.append(raw)
         if tag not in VOID and (self.left or tag in LEFT or ("translate", "no") in attrs):
             self.left.append(tag)

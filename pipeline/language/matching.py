@@ -8,6 +8,7 @@ entry matches is taken apart at full stops, semicolons, colons and commas, and i
 sentence of which a third would remain English stays English.
 """
 
+import itertools
 import re
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
@@ -15,7 +16,9 @@ from functools import lru_cache
 
 PLACE = re.compile(r"\{(\d+)\}")
 WORD = re.compile(r"[A-Za-z]{2,}")
-PLAIN = re.compile(r"(?<![\w./:=-])[a-z]{2,}(?![\w/:=-]|\.\w)")  # a word of a sentence: no part of a path or of a key
+PLAIN = re.compile(  # a word of a sentence: no unit, and no part of a path or of a key
+    r"(?<![\w./:=-])(?!(?:mm|cm|km|ms|min|deg)\b)[a-z]{2,}(?![\w/:=-]|\.\w)"
+)
 BREAKS = {  # where a text may be taken apart, coarse ones first, and what stands there then
     "\n": "\n", ". ": "。", "; ": "；", ": ": "：", ", ": "，", " and ": "、", " or ": "或",
 }  # fmt: skip
@@ -45,10 +48,10 @@ class Catalogue:
         self._by_word: dict[str, list[str]] = defaultdict(list)
         counts: dict[str, int] = defaultdict(int)
         for key in self._patterns:
-            for word in set(WORD.findall(PLACE.sub(" ", key))):
+            for word in set(WORD.findall(PLACE.sub(" ", key).lower())):
                 counts[word] += 1
         for key in self._patterns:
-            words = WORD.findall(PLACE.sub(" ", key))
+            words = WORD.findall(PLACE.sub(" ", key).lower())
             rarest = min(words, key=lambda word: (counts[word], word))
             self._by_word[rarest].append(key)
         self.translated = lru_cache(maxsize=20_000)(self._translated)
@@ -71,6 +74,8 @@ class Catalogue:
         for mark in ("\n", ". "):
             if mark in core.strip(mark):
                 first, second = core.split(mark, 1)
+                if mark == ". " and (found := self._whole(f"{first}.")) is not None:  # an entry with its full stop
+                    return f"{found}{self.translated(second)}"
                 return f"{self.translated(first)}{BREAKS[mark]}{self.translated(second)}"
         taken_apart = self._taken_apart(core)
         left, words = len(PLAIN.findall(taken_apart)), len(PLAIN.findall(core))
@@ -78,6 +83,11 @@ class Catalogue:
 
     def _taken_apart(self, core: str) -> str:
         """Return a sentence with its parts translated, each by itself."""
+        for mark in ("; ", ": ", ", "):
+            place = _outside_brackets(core, mark)
+            if place:
+                rest = core[place + len(mark) :]
+                return f"{self.translated(core[:place])}{BREAKS[mark]}{self.translated(rest)}"
         bracket = BRACKET.fullmatch(core)
         if bracket is not None:
             before, inside, after = bracket.groups()
@@ -111,8 +121,23 @@ class Catalogue:
         return best[2] if best else None
 
     def _candidates(self, core: str) -> Iterator[str]:
-        for word in dict.fromkeys(WORD.findall(core)):
+        for word in dict.fromkeys(WORD.findall(core.lower())):
             yield from self._by_word.get(word, ())
+
+
+def _outside_brackets(core: str, mark: str) -> int:
+    """Return the place of a mark at which a text may be taken apart: in no brackets, with text on both sides; else 0.
+
+    >>> _outside_brackets("noise (a, b), clocks", ", "), _outside_brackets("noise (a, b)", ", ")
+    (12, 0)
+    """
+    place = core.find(mark)
+    while place >= 0:
+        before = core[:place]
+        if before.strip() and core[place + len(mark) :].strip() and before.count("(") == before.count(")"):
+            return place
+        place = core.find(mark, place + 1)
+    return 0
 
 
 def _with_values(translation: str, values: Sequence[str]) -> str:
@@ -138,15 +163,16 @@ def _pattern(key: str) -> re.Pattern[str]:
 def sentences_of(entries: Mapping[str, str]) -> dict[str, str]:
     """Return an entry for each sentence of the entries that have several, where both languages have as many.
 
-    A page may show some of the sentences of a text alone.
+    A page may show some of the sentences of a text alone, or the part before a semicolon, without the advice behind it.
 
     >>> sentences_of({"{0} is on. {1} is off.": "{0}开。{1}关。"})
     {'{0} is on': '{0}开', '{0} is off': '{0}关'}
     """
-    found = {}
-    for key, value in entries.items():
-        english = [part for part in re.split(r"\.(?:\s+|$)", key) if part]
-        other = [part for part in value.split("。") if part]
+    found: dict[str, str] = {}
+    ends = [(r";\s+", "；"), (r"\.(?:\s+|$)", "。")]
+    for (english_end, other_end), (key, value) in itertools.product(ends, entries.items()):
+        english = [part for part in re.split(english_end, key) if part]
+        other = [part for part in value.split(other_end) if part]
         if len(english) != len(other) or len(english) < 2:
             continue
         for sentence, translation in zip(english, other, strict=True):

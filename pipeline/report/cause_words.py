@@ -9,8 +9,21 @@ import numpy as np
 AXES = {"x": "pitch", "y": "roll", "z": "yaw"}
 FACES_OF_FAMILY = {"P1": "on the -y side", "P2": "of the wall", "P3": "on the +y side", "H": "that are horizontal"}
 TURNS_OF_FAMILY = dict.fromkeys(  # turns of the normal along the tangents (maths/geometry/planes.py)
-    ("P1", "P2", "P3"), ("are turned by {} counter-clockwise from above", "lean away from the boat by {}")
-) | {"H": ("are tilted by {}, looking toward +x", "are tilted by {}, looking toward +y")}
+    ("P1", "P2", "P3"),
+    (
+        "the target: its wet faces {} are turned by {} counter-clockwise from above, against the dry ones",
+        "the target: its wet faces {} lean away from the boat by {}, against the dry ones",
+    ),
+) | {
+    "H": (
+        "the target: its wet faces {} are tilted by {}, looking toward +x, against the dry ones",
+        "the target: its wet faces {} are tilted by {}, looking toward +y, against the dry ones",
+    )
+}
+OTHER_TURNS = (
+    "the target: its wet faces {} are turned by {} (first tangent), against the dry ones",
+    "the target: its wet faces {} are turned by {} (second tangent), against the dry ones",
+)
 WORDS = {  # by parameter: scale and unit of its estimate, and the words round it
     "mbes_latency": (1e3, "ms", "the sonar's clock: its latency is {} more than mbes.latency_s says"),
     "laser_latency": (1e3, "ms", "the laser's clock: its latency is {} more than laser.latency_s says"),
@@ -92,8 +105,8 @@ def words_of(row: Mapping[Any, Any]) -> str:
         farther = PLACES[name][int(value < 0)]
         size = size_words(1e3 * abs(value), 1e3 * sigma, "mm").removeprefix("+")
         return (
-            f"the transmitter sits {size} {farther} than mbes.projector_offset_m says (null: where the receiver is), "
-            "in the sonar's own axes; measure it at the head, or find out to which point the head reduces its ranges"
+            f"the transmitter sits {farther} than mbes.projector_offset_m says (null: where the receiver is), by "
+            f"{size} in the sonar's own axes; measure it at the head, or find out to which point the head reduces its ranges"
         )
     if name.startswith("laser_rotation"):
         angle = size_words(np.degrees(value), np.degrees(sigma), "°")
@@ -137,13 +150,13 @@ def _words_of_wet_faces(name: str, value: float, sigma: float) -> str:
     faces = FACES_OF_FAMILY.get(family, f"of {family}")
     if kind.startswith("turn"):
         angle = size_words(np.degrees(value), np.degrees(sigma), "°")
-        turns = TURNS_OF_FAMILY.get(family, ("are turned by {} (first tangent)", "are turned by {} (second tangent)"))
-        return f"the target: its wet faces {faces} {turns[kind == 'turn 2'].format(angle)}, against the dry ones"
+        return TURNS_OF_FAMILY.get(family, OTHER_TURNS)[kind == "turn 2"].format(faces, angle)
     shift = size_words(1e3 * value, 1e3 * sigma, "mm")
     if kind == "bow":
         return f"the target: its wet faces {faces} are bowed outward, by {shift} at half depth; survey them"
-    verb = "lie higher" if family == "H" else "stand off"
-    return f"the target: its wet faces {faces} {verb} by {shift}; check its shape in the config, and its survey"
+    if family == "H":
+        return f"the target: its wet faces {faces} lie higher by {shift}; check its shape in the config, and its survey"
+    return f"the target: its wet faces {faces} stand off by {shift}; check its shape in the config, and its survey"
 
 
 def size_words(value: float, sigma: float, unit: str) -> str:

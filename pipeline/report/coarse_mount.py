@@ -41,14 +41,12 @@ class ShareOfCoarseMount:
     @property
     def advice(self) -> str:
         """Which values are not good enough and why, and what would help; empty if all are."""
-        parts = [
-            f"{_with_sigmas(values)} {words}"
-            for values, words in (
-                (self.above_limit, "above the verdict's limits"),
-                (self.unimproved, "not clearly better than the coarse mount, on which much of the value rests"),
-            )
-            if values
-        ]
+        parts = []
+        if self.above_limit:
+            parts.append(f"{_with_sigmas(self.above_limit)} above the verdict's limits")
+        if self.unimproved:
+            words = _with_sigmas(self.unimproved)
+            parts.append(f"{words} not clearly better than the coarse mount, on which much of the value rests")
         return "; ".join([*parts, REMEDY]) if parts else ""
 
 

@@ -32,15 +32,14 @@ def sigmas_above_limit(
     if sigmas is None:
         return [Statement(ReasonCode.NO_COVARIANCE, "the adjustment has no covariance")]
     bounds = {"deg": (limits.max_sigma_deg, "°"), "m": (limits.max_sigma_m, " m")}
-    return [
-        Statement(
-            ReasonCode.SIGMA_ABOVE_LIMIT,
-            f"total sigma of {MOUNT_WORDS[place]} is {sigmas[key]:.4g}{bounds[unit][1]}, above the limit of "
-            f"{bounds[unit][0]:g}{bounds[unit][1]}{_largest(sources, place, unit)}",
-        )
-        for name, place, key, unit in PARAMETERS
-        if name not in held and not sigmas[key] <= bounds[unit][0]
-    ]
+    found = []
+    for name, place, key, unit in PARAMETERS:
+        limit, symbol = bounds[unit]
+        if name not in held and not sigmas[key] <= limit:
+            above, most = f"{sigmas[key]:.4g}{symbol}", f"{limit:g}{symbol}"
+            words = f"total sigma of {MOUNT_WORDS[place]} is {above}, above the limit of {most}"
+            found.append(Statement(ReasonCode.SIGMA_ABOVE_LIMIT, f"{words}{_largest(sources, place, unit)}"))
+    return found
 
 
 def _largest(sources: Mapping[str, NDArray[np.float64]], place: int, unit: str) -> str:

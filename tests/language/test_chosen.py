@@ -31,9 +31,7 @@ def plain(monkeypatch: pytest.MonkeyPatch) -> None:
         ({"LANG": "C"}, "zh-CN", "zh"),
     ],
 )
-def test_language(
-    monkeypatch: pytest.MonkeyPatch, environment: dict[str, str], asked: str | None, spoken: str
-) -> None:
+def test_language(monkeypatch: pytest.MonkeyPatch, environment: dict[str, str], asked: str | None, spoken: str) -> None:
     for name, value in environment.items():
         monkeypatch.setenv(name, value)
     choose(asked)

@@ -160,7 +160,7 @@ REASONS: list[tuple[dict[str, Any], ReasonCode, str]] = [  # evidence, code, wor
     (
         {"freed": {"unknown": "projector_z", "value": 0.119, "sigma": 0.0017}},
         ReasonCode.SUSPECTED_CAUSE,
-        "the transmitter sits 119 ± 2 mm higher than mbes.projector_offset_m says (null: where the receiver is), in",
+        "the transmitter sits higher than mbes.projector_offset_m says (null: where the receiver is), by 119 ± 2 mm in",
     ),
     (
         {"freed": {"unknown": "projector_x", "value": -0.0204, "sigma": 0.0008}},

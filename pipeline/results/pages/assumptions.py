@@ -44,8 +44,8 @@ CLOCKS = {"laser.latency_sigma_s": "of the laser {} ms", "mbes.latency_sigma_s":
 IN_THOUSANDTHS = ("_m", "latency_sigma_s")  # ends of keys that are shown in mm or ms
 
 
-def assumed_groups(settings: Settings, drift_from_files: bool) -> Iterator[str]:
-    """Yield in words each group of figures that enter the total sigmas and that neither a file nor a preset gave.
+def assumed_groups(settings: Settings, drift_from_files: bool) -> Iterator[Mapping[str, str | list[str]]]:
+    """Yield each group of figures that enter the total sigmas and that neither a file nor a preset gave, in words.
 
     Figures that the data correct by their variance factors (noise of ranges, of angles, of the INS's records) are none.
 
@@ -61,7 +61,8 @@ def assumed_groups(settings: Settings, drift_from_files: bool) -> Iterator[str]:
         if drift_from_files and keys is OF_INS:
             assumed = {key: form for key, form in assumed.items() if key.endswith("_s")}
         if assumed:
-            yield f"{words} ({', '.join(form.format(_number(settings, key)) for key, form in assumed.items())})"
+            figures = [form.format(_number(settings, key)) for key, form in assumed.items()]
+            yield {"words": words, "figures": figures}
 
 
 def _groups(session: SessionConfig) -> Mapping[str, Mapping[str, str]]:

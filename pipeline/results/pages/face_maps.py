@@ -67,7 +67,7 @@ def residual_maps(residual_map: pd.DataFrame, faces: pd.DataFrame, sensor: str) 
     if image is not None:
         bar = figure.add_axes((0.9, 0.15, 0.015, 0.7))
         figure.colorbar(image, cax=bar, label="mean residual, mm", extend="both")
-    return picture(figure, f"maps of the {sensor}'s mean residuals over the faces")
+    return picture(figure, f"maps of the {'sonar' if sensor == 'mbes' else 'laser'}'s mean residuals over the faces")
 
 
 def _few_ticks(axis: Axes) -> None:

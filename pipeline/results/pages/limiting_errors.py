@@ -58,8 +58,10 @@ def limiting_sentences(
         squares = {words: float(of_source[place]) ** 2 for words, of_source in sources.items()}
         largest = max(squares, key=lambda words: squares[words])
         source, remedy = IN_WORDS[largest]
-        share = "most" if squares[largest] >= MOST * sum(squares.values()) else "the largest part"
         half_width = Quantity(WITHIN_95 * row["sigma_total"].number, unit).small()
         name = MOUNT_WORDS[place]
         known = f"{name[0].upper()}{name[1:]} is known to ±{half_width} (95 %)"
-        yield f"{known}; {share} of that comes from {source}: {remedy}"
+        if squares[largest] >= MOST * sum(squares.values()):
+            yield f"{known}; most of that comes from {source}: {remedy}"
+        else:
+            yield f"{known}; the largest part of that comes from {source}: {remedy}"

@@ -11,6 +11,7 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
+from pipeline.language.chosen import translated
 from pipeline.maths.geometry.rotations import rotation_from_mount
 from pipeline.mount import Mounted
 from pipeline.results.pages.mount_tables import POSITIVE
@@ -53,7 +54,7 @@ def turned(angle: str, degrees: float, point: Array) -> Array:
     return np.asarray(rotation_from_mount(angles["roll"], angles["pitch"], angles["yaw"]) @ point)
 
 
-def sign_drawings(mount: Mounted, sonar: bool) -> list[Mapping[str, str | Markup]]:
+def sign_drawings(mount: Mounted, sonar: bool) -> list[Mapping[str, str | Markup | list[str]]]:
     """Return three views, each with its picture (SVG) and the words for what stands in it.
 
     Parameters
@@ -67,7 +68,7 @@ def sign_drawings(mount: Mounted, sonar: bool) -> list[Mapping[str, str | Markup
         {
             "name": view.name,
             "angle": f"{view.angle} +: {POSITIVE[view.angle]}",
-            "axes": ", ".join(f"{LETTERS[axis]} + {POSITIVE[LETTERS[axis]]}" for axis in (view.right, view.up)),
+            "axes": [f"{LETTERS[axis]} +: {POSITIVE[LETTERS[axis]]}" for axis in (view.right, view.up)],
             "svg": _svg(view, mount, sonar),
         }
         for view in VIEWS
@@ -86,7 +87,7 @@ def _svg(view: View, mount: Mounted, sonar: bool) -> Markup:
     steps = np.linspace(0.0, TURN_DEG, 21)
     arc = [_flat(view, RADIUS * turned(view.angle, float(degrees), np.array(view.begins))) for degrees in steps]
     shapes += _arrow(arc, colour, 2.4)
-    shapes.append(_letter(f"{view.angle} +", arc[-1] + view.label, colour))
+    shapes.append(_letter(f"{translated(view.angle)} +", arc[-1] + view.label, colour))
     shapes.append(f'<line {_line(np.zeros(2), sensor)} stroke="{SONAR}" stroke-dasharray="4 3" stroke-width="1.4"/>')
     if sonar:
         look = sensor + _flat(view, LOOK * mount.R_body_from_sensor @ np.array([0.0, 0.0, -1.0]))
@@ -94,7 +95,7 @@ def _svg(view: View, mount: Mounted, sonar: bool) -> Markup:
     shapes.append(f'<circle cx="0" cy="0" r="4" fill="{INK}"/>')
     place = f'cx="{sensor[0]:.1f}" cy="{sensor[1]:.1f}"'
     shapes.append(f'<circle {place} r="5" fill="#fff" stroke="{SONAR}" stroke-width="2"/>')
-    label = f"the boat {view.name}: {view.angle} is positive {POSITIVE[view.angle]}"
+    label = translated(f"the boat {view.name}: {view.angle} is positive {POSITIVE[view.angle]}")
     head = f'<svg viewBox="-100 -100 200 200" width="200" height="200" role="img" aria-label="{label}">'
     return Markup(head + "".join(shapes) + "</svg>")  # numbers and this program's words alone
 

@@ -1,0 +1,77 @@
+"""In Chinese nothing stays English: pages, pictures and screen of runs, laser runs, check, diff and history."""
+
+from pathlib import Path
+
+import pytest
+
+from pipeline.results.pages.rendering import fonts_of
+from stages.commands.draw import Drawings, draw_missing
+from tests.end_to_end.test_history import planted
+from tests.support.left_english import english_of, texts_of_page, watch_pictures
+from tests.support.places import Place, Told, poolcal
+
+NAMES = ("undisturbed", "session", "small", "2026-05-12_small", "runs/a")
+
+
+@pytest.fixture(autouse=True)
+def chinese(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("POOLCAL_LANG", "zh")
+
+
+def drawn(run: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The texts of a run's report in Chinese, and of its pictures where this machine has Chinese letters."""
+    pictures = watch_pictures(monkeypatch)
+    (run / "report" / "report.html").unlink(missing_ok=True)
+    assert draw_missing(run, Drawings(report=True, recordings=False)) == []
+    return texts_of_page(run / "report" / "report.html") + (pictures if fonts_of("zh") else [])
+
+
+def assert_chinese(texts: list[str], *data: object) -> None:
+    left = list(english_of(texts, [*NAMES, *map(str, data)]))
+    assert not left, "\n".join(f"[{words}] {text}" for text, words in left)
+
+
+def screen(told: Told) -> list[str]:
+    return [*told.out.splitlines(), *told.complaints]
+
+
+def test_an_accepted_run(done: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+    told = poolcal(*done.words())
+    assert told.status == 0
+    assert_chinese(screen(told) + drawn(done.run, monkeypatch), done.folder)
+
+
+def test_a_rejected_run(done: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+    done.edit_config("verdict", max_sigma_deg=1e-6)
+    told = done.calibrate()
+    assert told.status == 1
+    assert_chinese(screen(told) + drawn(done.run, monkeypatch), done.folder)
+
+
+def test_a_laser_run(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+    told = poolcal("laser", *place.words()[1:], "--no-report", "--no-recordings", "--no-write")
+    assert told.status in (0, 1), told.err
+    assert_chinese(screen(told) + drawn(place.run, monkeypatch), place.folder)
+
+
+def test_a_check_with_findings(place: Place) -> None:
+    place.edit_session("mbes", latency_s=0.5)
+    place.edit_session("laser", gps_week=2400)
+    told = poolcal("check", place.session, "--config", place.config)
+    assert told.status == 1, told.err
+    assert_chinese(screen(told), place.folder)
+
+
+def test_two_runs_and_many(done: Place, undisturbed: tuple[Path, Told], monkeypatch: pytest.MonkeyPatch) -> None:
+    done.edit_config("verdict", max_sigma_deg=0.06)
+    assert done.calibrate().status == 0
+    pictures = watch_pictures(monkeypatch)
+    folder = done.folder / "runs"
+    for day, shift in enumerate((0.0, 0.0, 0.06, 0.06), 1):
+        planted(folder, done.run, f"run{day}", day, z_m=shift)
+    planted(folder, done.run, "refused", 5, verdict="rejected", nothing=True)
+    page = done.folder / "diff.html"
+    texts = screen(poolcal("diff", undisturbed[0], done.run, "--html", page))
+    texts += screen(poolcal("history", folder)) + texts_of_page(folder / "history" / "history.html")
+    texts += texts_of_page(page) + (pictures if fonts_of("zh") else [])
+    assert_chinese(texts, done.folder, "run1", "run2", "run3", "run4", "refused")
