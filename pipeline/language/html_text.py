@@ -53,9 +53,9 @@ class _Page(HTMLParser):
             return
         self.end_text()
         for name, value in attrs:
-            if name in SPOKEN and value:
-                spoken = f'{name}="{escape(translated(value))}"'
-                raw = re.sub(rf'\b{name}="[^"]*"', lambda _, spoken=spoken: spoken, raw, count=1)
+            found = re.search(rf'\b{name}="[^"]*"', raw) if name in SPOKEN and value else None
+            if found and value:
+                raw = f'{raw[: found.start()]}{name}="{escape(translated(value))}"{raw[found.end() :]}'
         self.parts.append(raw)
         if tag not in VOID and (self.left or tag in LEFT or ("translate", "no") in attrs):
             self.left.append(tag)
