@@ -21,7 +21,7 @@ DEMO    := runs/demo-session
 .DEFAULT_GOAL := help
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
-.PHONY: docs help setup setup-visual demo calibrate repeat stages diff view test thorough lint format bench pictures montecarlo clean
+.PHONY: docs help packages setup setup-visual demo calibrate repeat stages diff view test thorough lint format bench pictures montecarlo clean
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{printf "%-20s %s\n", $$1, $$2}'
@@ -90,6 +90,11 @@ else
 stages:
 	@:$(GIVEN)$(error make stages takes no paths with blanks: use make calibrate)
 endif
+
+packages: $(SETUP) ## the wheel and all it needs in runs/packages, for machines without internet or repository
+	rm -rf build runs/packages
+	$(PY) -m pip --disable-pip-version-check wheel -q -c constraints.txt -w runs/packages .
+	rm -rf build
 
 # --- developing --------------------------------------------------------------------------------------------------------
 lint: $(SETUP) ## style, types, imports
