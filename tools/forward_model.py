@@ -28,7 +28,9 @@ from pipeline.simulation.site import Site
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 DEFAULTS = Segment()
-NORMALS = np.array([[-1, 0, 0], [-0.5**0.5, -(0.5**0.5), 0], [-0.5**0.5, 0.5**0.5, 0], [0, 0, 1]])  # of the families
+NORMALS = np.array(
+    [[-1, 0, 0], [-(0.5**0.5), -(0.5**0.5), 0], [-(0.5**0.5), 0.5**0.5, 0], [0, 0, 1]]
+)  # of the families
 LASER_BEAM_M = float(Laser.model_fields["beam_m"].default)
 BEFORE_M = 0.001  # what stands nearer than the plane by more is before it
 SMALL_TILT = np.cos(np.radians(5.0))

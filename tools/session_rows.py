@@ -64,9 +64,7 @@ def session_in_memory(
 
 def simulated(campaign: Campaign, number: int) -> tuple[SimulatedSession, SessionConfig, PoolConfig]:
     """Simulate a session and return it with its settings."""
-    made = simulate_session(
-        parse(Scenario, scenario_of(campaign, number), campaign.name), campaign.first_seed + number
-    )
+    made = simulate_session(parse(Scenario, scenario_of(campaign, number), campaign.name), campaign.first_seed + number)
     return made, parse(SessionConfig, made.session, "session"), parse(PoolConfig, made.pool, "pool")
 
 

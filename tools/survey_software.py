@@ -27,6 +27,7 @@ Array = NDArray[np.float64]
 FRD = np.array(
     [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]
 )  # starboard, forward, up -> forward, starboard, down
+SPEED_M_S = 1480.0
 LETTERS = {"h": "Z", "p": "Y", "r": "X"}  # axes of the angles in forward, starboard, down
 
 
@@ -50,6 +51,18 @@ class Entry:
         Its ranges by the recorded ones.
     matrix
         Rotation R_body_from_mbes (3, 3) in place of the angles, axes starboard, forward, up.
+    steer_factor
+        Sines of its beam angles by the recorded ones.
+    gradient_per_s
+        Growth of its sound speed with depth: rays bend toward the lower speed.
+    shift_m
+        East, north, up: of all positions.
+    attitude_deg
+        Added to all roll, pitch, heading: another alignment of the INS.
+    wander_m
+        Size of the slow differences of its trajectory, with periods of 40 to 300 s.
+    smoothed_beams
+        Each sounding is the mean of so many neighbours.
     """
 
     angles_deg: tuple[float, float, float]
@@ -59,6 +72,12 @@ class Entry:
     level_lever_arm: bool = False
     range_factor: float = 1.0
     matrix: Array | None = None
+    steer_factor: float = 1.0
+    gradient_per_s: float = 0.0
+    shift_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    attitude_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    wander_m: float = 0.0
+    smoothed_beams: int = 1
 
     def rotation(self) -> Array:
         """Return the mount's rotation, forward-starboard-down from the sonar's forward-starboard-down axes."""
@@ -113,11 +132,12 @@ def georeferenced(recorded: Recording, entry: Entry) -> Array:
     track = np.stack(to_ecef.transform(longitude, latitude, ins["height_m"]), 1)
     level = Rotation.from_euler("ZY", np.stack([longitude, -90.0 - latitude], 1), degrees=True)  # ecef from n, e, d
     headings = np.stack([ins["azimuth_rad"], ins["pitch_rad"], ins["roll_rad"]], 1)
+    headings += np.radians(entry.attitude_deg[::-1])
     at = np.clip(recorded.t_ns + round(entry.delay_s * 1e9), t[0], t[-1])
     seconds = (t - t[0]) / 1e9
     poses = Slerp(seconds, level * Rotation.from_euler("ZYX", headings))((at - t[0]) / 1e9)
     place = np.stack([np.interp((at - t[0]) / 1e9, seconds, axis) for axis in track.T], 1)
-    seen = poses.apply(recorded.points_m * entry.range_factor @ entry.rotation().T)
+    seen = poses.apply(_pointed(recorded.points_m, entry) @ entry.rotation().T)
     arm = np.array(entry.lever_arm_m)
     if entry.level_lever_arm:
         heading_only = np.zeros_like(headings)
@@ -127,7 +147,39 @@ def georeferenced(recorded: Recording, entry: Entry) -> Array:
         moved = flat.apply(np.column_stack([np.tile(arm[:2], (len(at), 1)), down]))
     else:
         moved = poses.apply(arm)
-    return np.asarray(place + moved + seen)
+    up = place / np.linalg.norm(place, axis=1)[:, None]  # of the sphere: the ellipsoid's is 0.2 degrees off at most
+    height = np.einsum("ni,ni->n", seen, up)[:, None]
+    level_range = np.linalg.norm(seen - height * up, axis=1)[:, None]
+    bent = up * entry.gradient_per_s / SPEED_M_S * level_range**2 / 2  # an arc of the curvature gradient / speed
+    shift = level.apply(np.array([entry.shift_m[1], entry.shift_m[0], -entry.shift_m[2]]))[0]
+    placed = place + moved + seen + bent + shift + _wander((at - t[0]) / 1e9, entry.wander_m)
+    return _smoothed(np.asarray(placed), recorded.t_ns, entry.smoothed_beams)
+
+
+def _pointed(points_m: Array, entry: Entry) -> Array:
+    """Return the soundings with the software's beam angles and ranges; x and y are those of an array's two cones."""
+    level = points_m[:, :2] * entry.steer_factor
+    ranges = np.linalg.norm(points_m, axis=1)
+    down = np.sqrt(np.maximum(ranges**2 - (level**2).sum(axis=1), 0.0)) * np.sign(points_m[:, 2])
+    return np.column_stack([level, down]) * entry.range_factor
+
+
+def _wander(at_s: Array, size_m: float) -> Array:
+    """Return slow differences (n, 3) of a trajectory, a sum of waves; the same at each call."""
+    random = np.random.default_rng(11)
+    waves = [np.sin(2 * np.pi * (at_s[:, None] / random.uniform(40, 300, 3) + random.random(3))) for _ in range(4)]
+    return np.asarray(size_m * sum(waves) / np.sqrt(2))
+
+
+def _smoothed(points: Array, t_ns: NDArray[np.int64], beams: int) -> Array:
+    """Return means of so many neighbours in a ping; those at the ends stay as they are."""
+    if beams == 1:
+        return points
+    means = np.stack([np.convolve(axis, np.full(beams, 1 / beams), "same") for axis in points.T], 1)
+    half = beams // 2
+    whole = np.zeros(len(points), bool)
+    whole[half:-half] = t_ns[2 * half :] == t_ns[: -2 * half]
+    return np.where(whole[:, None], means, points)
 
 
 def in_crs(ecef_m: Array, crs: str, lift_m: float = 0.0) -> Array:

@@ -105,7 +105,8 @@ def _loaded(text: str, path: Path, load: Callable[[_StrictLoader], Any]) -> Any:
     try:
         return load(_StrictLoader(text))
     except (yaml.YAMLError, ValueError) as error:
-        raise ConfigError(f"{path}: not valid YAML: {error}; correct the file") from error
+        words = " ".join(str(error).replace('in "<unicode string>", ', "at ").split())
+        raise ConfigError(f"{path}: not valid YAML: {words}; correct the file") from error
     except RecursionError as error:
         raise ConfigError(f"{path}: not valid YAML: it is nested too deeply; correct the file") from error
     except Exception as error:  # the library may raise any exception for a value that it cannot read

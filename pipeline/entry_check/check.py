@@ -46,7 +46,7 @@ def check_entry(run: FinishedRun, path: Path, crs: str | None, other_heights: bo
     if pairs is None:
         raise RawDataError(_not_found(path, file))
     heights_differ = other_heights or file.depths or pairs.negated or file.placing.geoid is not None
-    answer = answer_of(pairs, source, heights_differ)
+    answer = answer_of(pairs, source, heights_differ, file.points.rounding_m)
     return EntryCheck(path, side, source, file, pairs, heights_differ, answer)
 
 

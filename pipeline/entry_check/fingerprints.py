@@ -2,8 +2,11 @@
 
 All soundings of a ping are placed with one pose and one mount. So the distances between neighbouring beams are the same
 in the run and in the file, however wrong the mount, the CRS's origin or the height reference is. Noise makes them as
-individual as a fingerprint: 5 neighbours have 10 distances, 9 neighbours 36. Exported files keep the order of pings
-and beams; where a file holds every n-th beam alone, beams n apart are compared.
+individual as a fingerprint: 5 neighbours have 10 distances, of 15 some are taken. Exported files keep the order of
+pings and beams; where a file holds every n-th beam alone, beams n apart are compared.
+
+Windows that follow each other as in the run are right, whatever poses the software had. Where the order tells nothing,
+those count that one mount explains.
 """
 
 from dataclasses import dataclass, replace
@@ -12,18 +15,23 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from pipeline.entry_check.mount_fit import FREE_ALL, best_rotation, fit_mount
+from pipeline.entry_check.mount_fit import FREE_ALL, FittedMount, best_rotation, fit_mount, freed
+from pipeline.entry_check.ordering import Windows, in_order, whole_pings
 from pipeline.entry_check.run_soundings import RunSoundings
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-WINDOW, WIDE_WINDOW = 5, 9  # beams; the wide one where coordinates are rounded to more than COARSE_M
+WINDOW, WIDE_WINDOW = 5, 15  # beams; the wide one where coordinates are rounded to more than COARSE_M
 COARSE_M = 0.002
 LAGS = (1, 2, 3, 4)
-MOST_QUERIES, MOST_WIDE_QUERIES = 5000, 1500
+MOST_QUERIES, MOST_WIDE_QUERIES = 20_000, 40_000
 TRIALS, DRAWN = 400, 3  # windows of a trial
 CLOSE_M = 0.15  # a window that a trial explains; a height reference that is wrong by 10 m tilts it by so much
 LEAST_WINDOWS = 8
+DELAYS_S = (0.0, 0.5, -0.5, 1.0, -1.0, 2.0, -2.0, 18.0, -18.0, 19.0, -19.0, 37.0, -37.0)  # GPS, UTC, TAI; whole seconds
+DELAY_TRIED = 1500  # soundings
+LEAST_WHOLE = 0.5  # of the beams of matched pings; another session over the same target has no whole pings alike
+LESS = 0.5  # a delay counts if it lessens the scatter so much
 
 
 @dataclass(frozen=True)
@@ -49,12 +57,31 @@ class FilePoints:
         return replace(self, points_m=self.points_m * [1.0, 1.0, -1.0])
 
 
-def matched_windows(soundings: RunSoundings, file: FilePoints) -> tuple[Integers, Integers, bool]:
-    """Return pairs: numbers (m,) of soundings and of the file's points, and whether the file's heights are depths.
+@dataclass(frozen=True)
+class Matches:
+    """Soundings and points that belong together, by their distances.
 
-    Distances do not change with the sign of the heights; the sign is that with which a mount explains them better. The
-    arrays are empty if the order tells nothing.
+    Attributes
+    ----------
+    own, other
+        (m,): numbers of soundings and of the file's points.
+    negated
+        Whether the file's heights are depths. Distances do not show it; a mount explains one sign better.
+    fitted
+        A first mount.
+    in_order
+        Whether the order proves each pair; else they are those that the mount explains.
     """
+
+    own: Integers
+    other: Integers
+    negated: bool
+    fitted: FittedMount
+    in_order: bool
+
+
+def matched(soundings: RunSoundings, file: FilePoints) -> Matches | None:
+    """Return what belongs together; None if distances tell nothing."""
     beams = WINDOW if file.rounding_m < COARSE_M else WIDE_WINDOW
     file_rows = _windows_of_file(file, beams)
     for lag in LAGS:
@@ -63,12 +90,45 @@ def matched_windows(soundings: RunSoundings, file: FilePoints) -> tuple[Integers
             continue
         both = _alike(soundings.points_mbes_m[run_rows], file.points_m[file_rows], file.rounding_m)
         for (own, other), order in zip(both, (slice(None), slice(None, None, -1)), strict=True):
-            rows = run_rows[own], file_rows[other][:, order]
-            explained = [(_consistent(soundings, heights, *rows), heights is not file) for heights in _signs(file)]
-            (used, error_m), negated = min(explained, key=lambda one: one[0][1])
-            if error_m < np.inf:
-                return rows[0][used].ravel(), rows[1][used].ravel(), negated
-    return np.empty(0, np.int64), np.empty(0, np.int64), False
+            windows = Windows(run_rows[own], file_rows[other][:, order], lag)
+            found = _by_order(soundings, file, windows) or _by_mount(soundings, file, windows)
+            if found is not None:
+                return found
+    return None
+
+
+def _by_order(soundings: RunSoundings, file: FilePoints, windows: Windows) -> Matches | None:
+    chain = in_order(windows)
+    if chain is None:
+        return None
+    limit_m = 0.004 + 2 * file.rounding_m
+    (own, other), share = whole_pings(chain, soundings, file.points_m, file.row, limit_m)
+    if share < LEAST_WHOLE:
+        return None
+    some = np.arange(0, len(own), max(1, len(own) // DELAY_TRIED))
+    tried = [(_delayed(soundings.rows(own[some]), one.points_m[other[some]]), one) for one in _signs(file)]
+    fitted, points = min(tried, key=lambda one: one[0].scatter_m)
+    return Matches(own, other, points is not file, fitted, True)
+
+
+def _delayed(soundings: RunSoundings, points_m: Array) -> FittedMount:
+    """Return the mount, with the delay of the poses by which the scatter is least, if that is far less."""
+    plain = fit_mount(soundings, points_m, FREE_ALL)
+    free = freed("shift_x", "shift_y", "shift_z", "delay")
+    late = min((fit_mount(soundings, points_m, free, s) for s in DELAYS_S), key=lambda one: one.scatter_m)
+    return late if late.scatter_m < LESS * plain.scatter_m else plain
+
+
+def _by_mount(soundings: RunSoundings, file: FilePoints, windows: Windows) -> Matches | None:
+    rows = windows.run_rows, windows.file_rows
+    explained = [(_consistent(soundings, heights, *rows), heights) for heights in _signs(file)]
+    (used, error_m), points = min(explained, key=lambda one: one[0][1])
+    if error_m == np.inf:
+        return None
+    own, other = rows[0][used].ravel(), rows[1][used].ravel()
+    return Matches(
+        own, other, points is not file, fit_mount(soundings.rows(own), points.points_m[other], FREE_ALL), False
+    )
 
 
 def _signs(file: FilePoints) -> tuple[FilePoints, FilePoints]:
@@ -100,7 +160,7 @@ def _alike(run: Array, file: Array, rounding_m: float) -> tuple[tuple[Integers, 
     2 mm, for other software may trace the rays a little differently.
     """
     tree = cKDTree(_distances(run))
-    limit = np.sqrt(run.shape[1] * (run.shape[1] - 1) / 2) * max(0.002, 0.7 * rounding_m)
+    limit = np.sqrt(tree.m) * max(0.002, rounding_m)
     found = []
     for features in (_distances(file), _distances(file[:, ::-1])):
         distance, place = tree.query(features, k=2, distance_upper_bound=2 * limit)
@@ -110,7 +170,11 @@ def _alike(run: Array, file: Array, rounding_m: float) -> tuple[tuple[Integers, 
 
 
 def _distances(windows: Array) -> Array:
+    """Return all distances of a short window (w, 10), of a wide one those of beams 4, 7 and 14 apart, (w, 20)."""
     one, other = np.triu_indices(windows.shape[1], 1)
+    if windows.shape[1] == WIDE_WINDOW:
+        wanted = np.isin(other - one, (4, 7, 14))
+        one, other = one[wanted], other[wanted]
     return np.asarray(np.linalg.norm(windows[:, one] - windows[:, other], axis=2))
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from pipeline.entry_check.fingerprints import FilePoints, matched_windows
+from pipeline.entry_check.fingerprints import FilePoints, matched
 from pipeline.entry_check.mount_fit import FREE_ALL, SIZE, FittedMount, fit_mount
 from pipeline.entry_check.run_soundings import RunSoundings
 from pipeline.mount import Mounted
@@ -28,6 +28,7 @@ PROBE_M = np.array([[0.31, 0.0, 0.0], [0.0, 0.31, 0.0], [0.0, 0.0, 0.31], [-0.23
 LEAST_PAIRS = 60
 LEAST_SHARE, ABOVE_CHANCE = 0.01, 8.0  # of the run's soundings found again, and by what chance would find;
 MOST, MOST_ABOVE_CHANCE = 0.4, 2.0  # or so many, where a file with rounded coordinates is met by chance often
+WELL_ORDERED = 0.3  # of the run's soundings in pairs that the order proves: no more are needed
 FITTED = 4000  # pairs of each step before the last
 LEVEL_SEARCH_M = 0.01  # horizontal distance of the points whose heights are compared
 LEVEL_BIN_M = 0.01
@@ -53,6 +54,8 @@ class Pairs:
         Whether the file's heights are depths, positive down.
     how
         "order" (of pings and beams in the file) or "places".
+    delay_s
+        By how much the software's poses are late, roughly.
     """
 
     soundings: RunSoundings
@@ -62,6 +65,7 @@ class Pairs:
     chance: float
     negated: bool
     how: str
+    delay_s: float = 0.0
 
 
 def identify(soundings: RunSoundings, file: FilePoints, starts: Sequence[Mounted]) -> Pairs | None:
@@ -76,13 +80,21 @@ def identify(soundings: RunSoundings, file: FilePoints, starts: Sequence[Mounted
     starts
         Mounts that may have been entered, the likeliest first.
     """
-    own, other, negated = matched_windows(soundings, file)
-    if len(own):
-        turned = file.with_depths() if negated else file
-        fitted = fit_mount(soundings.rows(own), turned.points_m[other], FREE_ALL)
-        pairs = _refined(soundings, turned, fitted, Way(negated, "order", GATES_M))
+    found = matched(soundings, file)
+    if found is not None:
+        turned = file.with_depths() if found.negated else file
+        share = len(found.own) / len(soundings.t_ns)
+        points = turned.points_m[found.other]
+        in_order = Pairs(
+            soundings.rows(found.own), points, len(found.own), share, 0.0, found.negated, "order", found.fitted.delay_s
+        )
+        if found.in_order and share >= WELL_ORDERED:
+            return in_order
+        pairs = _refined(soundings, turned, found.fitted, Way(found.negated, "order", GATES_M))
         if pairs is not None:
             return pairs
+        if found.in_order:
+            return in_order
     both = (_from_places(soundings, turned, starts, turned is not file) for turned in (file, file.with_depths()))
     return next((pairs for pairs in both if pairs is not None), None)
 
@@ -147,7 +159,7 @@ def _refined(soundings: RunSoundings, file: FilePoints, fitted: FittedMount, way
         if len(own) < LEAST_PAIRS:
             return None
         step = max(1, len(own) // FITTED)
-        fitted = fit_mount(thin.rows(own[::step]), file.points_m[other[::step]], FREE_ALL)
+        fitted = fit_mount(thin.rows(own[::step]), file.points_m[other[::step]], FREE_ALL, fitted.delay_s)
     gate = float(np.clip(3 * fitted.scatter_m, 1.8 * file.rounding_m + 0.002, GATES_M[-1]))
     predicted = fitted.predicted(soundings)
     own, other = _nearest(tree, predicted, gate)
@@ -156,7 +168,9 @@ def _refined(soundings: RunSoundings, file: FilePoints, fitted: FittedMount, way
     clear = share >= max(LEAST_SHARE, ABOVE_CHANCE * by_chance) or share >= max(MOST, MOST_ABOVE_CHANCE * by_chance)
     if len(own) < LEAST_PAIRS or not clear:
         return None
-    return Pairs(soundings.rows(own), file.points_m[other], len(own), share, by_chance, way.negated, way.how)
+    return Pairs(
+        soundings.rows(own), file.points_m[other], len(own), share, by_chance, way.negated, way.how, fitted.delay_s
+    )
 
 
 def _nearest(tree: cKDTree, predicted: Array, gate_m: float) -> tuple[Integers, Integers]:

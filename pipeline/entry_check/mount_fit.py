@@ -1,15 +1,19 @@
 """The mount that a survey software worked with, from pairs of its soundings and the run's.
 
-The software places a sounding at X = p + R_pool_from_body (R x + t) + s, with the run's x in frame mbes, the pose of
-its time, the entered mount R, t, and a shift s of all positions (another height reference or datum; 0 if all is right).
-In body axes, b = R_pool_from_bodyᵀ (X - p), this is
+The software places a sounding at X = p + R_pool_from_body (k R x + t) + s, with the run's x in frame mbes, the pose p,
+R_pool_from_body of a time that is later than the sounding's by d, the entered mount R, t, a shift s of all positions
+(another height reference or datum), and a factor k of the ranges (another sound speed); s = 0, k = 1, d = 0 if all is
+right. In body axes, b(d) = R_pool_from_bodyᵀ (X - p), this is
 
-    b = k R x + t + R_pool_from_bodyᵀ s,
+    b(d) = k R x + t + R_pool_from_bodyᵀ s,
 
-linear in t and s, and by R = Exp(ε) R_before linear in ε: ∂b/∂ε = -skew(k R x). The factor k of the ranges is 1 unless
-the software works with another sound speed. The start is the rotation that turns the
-points x best onto b (Kabsch 1976; Wahba's problem), and Gauss-Newton steps follow. Where the boat keeps one heading, t
-and s can hardly be told apart: a weak prior of 0 on s leaves it in t.
+linear in t and s, and by R = Exp(ε) R_before linear in ε: ∂b/∂ε = -skew(k R x); ∂b/∂d is a difference of poses. The
+start is the rotation that turns the points x best onto b (Kabsch 1976; Wahba's problem), and Gauss-Newton steps follow.
+Where the boat keeps one heading, t and s can hardly be told apart: a weak prior of 0 on s leaves it in t.
+
+The covariance is the larger of two: that of residuals which have a common error within a second (Liang and Zeger 1986),
+and that of the leave-one-out of whole passes (:mod:`pipeline.entry_check.leave_one_out`), which also sees rays and
+positions that differ from pass to pass.
 """
 
 from dataclasses import dataclass
@@ -17,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.entry_check.leave_one_out import leave_one_out, time_groups
 from pipeline.entry_check.run_soundings import NS_PER_S, RunSoundings
 from pipeline.maths.geometry.rotations import exp_so3
 
@@ -25,9 +30,20 @@ MAX_STEPS = 12
 ENDED = 1e-9  # rad and m: a smaller step is the last
 CUT = 4.0  # residuals beyond this number of robust sigmas get no weight (Tukey's function)
 CLUSTER_S = 1.0  # residuals within it may have a common error
-SIZE = 10  # ε, t, s, k
-FREE_MOUNT, FREE_ALL = (True,) * 6 + (False,) * 4, (True,) * SIZE
+NAMES = ("rx", "ry", "rz", "x", "y", "z", "shift_x", "shift_y", "shift_z", "k", "delay")
+SIZE = len(NAMES)
 LOOSE_M = 1e3  # of the weak prior, against a millimetre of each point
+STEP_S = 0.005  # of the difference of poses
+SCAN_S = tuple(0.0025 * np.arange(-12, 13))
+SCANNED = 1000  # soundings
+
+
+def freed(*names: str) -> tuple[bool, ...]:
+    """Return which parameters are estimated: the mount's six, and those of these names."""
+    return tuple(place < 6 or name in names for place, name in enumerate(NAMES))
+
+
+FREE_MOUNT, FREE_ALL = freed(), freed("shift_x", "shift_y", "shift_z", "k")
 
 
 @dataclass(frozen=True)
@@ -38,10 +54,10 @@ class FittedMount:
     ----------
     R_body_from_mbes, lever_arm_m, shift_m
         R (3, 3), t (3,), s (3,) (pool frame).
-    range_factor
-        k.
+    range_factor, delay_s
+        k, d.
     covariance
-        (10, 10) of ε (rad, body axes), t, s (m) and k; rows of fixed parameters are 0.
+        (SIZE, SIZE) of ε (rad, body axes), t, s (m), log k and d (s); rows of fixed parameters are 0.
     scatter_m
         Root of the mean squared residual of one coordinate, robust weights.
     weight
@@ -55,9 +71,12 @@ class FittedMount:
     covariance: Array
     scatter_m: float
     weight: Array
+    delay_s: float = 0.0
 
     def predicted(self, soundings: RunSoundings) -> Array:
         """Return where the software places soundings, (n, 3) m, pool frame."""
+        if self.delay_s:
+            soundings = soundings.later(self.delay_s)
         return soundings.placed(self.range_factor * self.R_body_from_mbes, self.lever_arm_m) + self.shift_m
 
 
@@ -71,12 +90,9 @@ def best_rotation(x: Array, b: Array, weight: Array) -> tuple[Array, Array]:
 
 
 def fit_mount(
-    soundings: RunSoundings,
-    points_pool_m: Array,
-    free: tuple[bool, ...] = FREE_MOUNT,
-    lever_arm_m: Array | None = None,
+    soundings: RunSoundings, points_pool_m: Array, free: tuple[bool, ...] = FREE_MOUNT, delay_s: float = 0.0
 ) -> FittedMount:
-    """Return the mount, and the shift where it is free, that places the soundings at their pairs.
+    """Return the mount, and whatever else is free, that places the soundings at their pairs.
 
     Parameters
     ----------
@@ -85,46 +101,71 @@ def fit_mount(
     points_pool_m
         (n, 3): where the software placed the same soundings.
     free
-        Which of ε, t, s, k are estimated, SIZE in all; others keep their values: t those of ``lever_arm_m``, s 0, k 1.
-    lever_arm_m
-        Lever arm (3,) of the components that are not free.
+        Which of ε, t, s, k, d are estimated, SIZE in all; others keep their values: s 0, k 1, d ``delay_s``.
+    delay_s
+        Value of d from which the search begins.
     """
+    used, d, recorded = np.array(free), delay_s, soundings
+    soundings = recorded.later(d) if d else recorded
     x, b = soundings.points_mbes_m, soundings.in_body(points_pool_m)
-    back = np.swapaxes(soundings.R_pool_from_body, -1, -2)
-    used = np.array(free)
     R, t = best_rotation(x, b, np.ones(len(x)))
-    if lever_arm_m is not None:
-        t = np.where(used[3:6], t, lever_arm_m)
     s, k, weight, moved = np.zeros(3), 1.0, np.ones(len(x)), np.inf
-    normal, design = np.eye(SIZE), np.empty((len(x), 3, SIZE))
-    residual, variance = b, 1.0
+    normal, design, residual, variance = np.eye(SIZE), np.empty((len(x), 3, SIZE)), b, 1.0
     for step in range(MAX_STEPS + 1):
-        turned = k * x @ R.T
+        turned, back = k * x @ R.T, np.swapaxes(soundings.R_pool_from_body, -1, -2)
         residual = b - turned - t - back @ s
         weight = _tukey(np.linalg.norm(residual, axis=1))
         variance = float(weight @ np.einsum("ni,ni->n", residual, residual)) / (3 * weight.sum())
-        design = _design(turned, back)[:, :, used]
+        by_delay = _by_delay(recorded, points_pool_m, d) if used[-1] else np.zeros_like(b)
+        design = _design(turned, back, by_delay)[:, :, used]
         normal = np.einsum("nik,n,nil->kl", design, weight, design, optimize=True)
-        normal += np.diag(np.r_[np.zeros(6), np.full(3, max(variance, 1e-6) / LOOSE_M**2), 0.0][used])
+        loose = max(variance, 1e-6) / LOOSE_M**2 * np.repeat([0.0, 1.0, 0.0], [6, 3, 2])
+        normal += np.diag(loose[used])
         if moved < ENDED or step == MAX_STEPS:
             break
         right = np.einsum("nik,n,ni->k", design, weight, residual, optimize=True)
-        right -= np.r_[np.zeros(6), max(variance, 1e-6) / LOOSE_M**2 * s, 0.0][used]
+        right -= (loose * np.r_[np.zeros(6), s, np.zeros(2)])[used]
         delta = np.zeros(SIZE)
         delta[used] = np.linalg.lstsq(normal, right, rcond=1e-14)[0]
-        R, t, s, k = exp_so3(delta[:3]) @ R, t + delta[3:6], s + delta[6:9], k * (1 + delta[9])
+        R, t, s, k = exp_so3(delta[:3]) @ R, t + delta[3:6], s + delta[6:9], k * np.exp(delta[9])
         moved = float(np.abs(delta).max())
+        if used[-1]:
+            d += float(delta[10])
+            soundings = recorded.later(d)
+            b = soundings.in_body(points_pool_m)
     covariance = np.zeros((SIZE, SIZE))
-    covariance[np.ix_(used, used)] = _covariance(design, weight, residual, normal, soundings.t_ns)
-    return FittedMount(R, t, s, k, covariance, float(np.sqrt(variance)), weight)
+    covariance[np.ix_(used, used)] = _covariance(design, weight, residual, normal, recorded.t_ns)
+    return FittedMount(R, t, s, k, covariance, float(np.sqrt(variance)), weight, d)
 
 
-def _design(turned: Array, back: Array) -> Array:
-    """Return ∂b/∂(ε, t, s, log k), (n, 3, SIZE): -skew(k R x), the identity, R_pool_from_bodyᵀ, k R x."""
+def fit_delay(soundings: RunSoundings, points_pool_m: Array, names: tuple[str, ...], delay_s: float) -> FittedMount:
+    """Return the mount with the delay of the software's poses; ``names``: what else is free, ``delay_s``: a start.
+
+    Poses have noise from record to record. So the scatter falls sharply within one record of the true delay alone, and
+    around it hardly: steps end anywhere there, and a scan finds it.
+    """
+    late = fit_mount(soundings, points_pool_m, freed(*names, "delay"), delay_s)
+    some = np.arange(0, len(points_pool_m), max(1, len(points_pool_m) // SCANNED))
+    thin, there = soundings.rows(some), points_pool_m[some]
+    near = [fit_mount(thin, there, freed(*names), late.delay_s + step) for step in SCAN_S]
+    best = min(near, key=lambda one: one.scatter_m)
+    again = fit_mount(soundings, points_pool_m, freed(*names, "delay"), best.delay_s)
+    return min((again, late), key=lambda one: one.scatter_m)
+
+
+def _by_delay(soundings: RunSoundings, points_pool_m: Array, delay_s: float) -> Array:
+    """Return -∂b/∂d (n, 3): by so much does a later pose lessen what remains of b."""
+    before, after = (soundings.later(delay_s + step).in_body(points_pool_m) for step in (-STEP_S, STEP_S))
+    return np.asarray((before - after) / (2 * STEP_S))
+
+
+def _design(turned: Array, back: Array, by_delay: Array) -> Array:
+    """Return ∂b/∂(ε, t, s, log k), -∂b/∂d, (n, 3, SIZE): -skew(k R x), the identity, R_pool_from_bodyᵀ, k R x."""
     n, (x, y, z) = len(turned), turned.T
     zero = np.zeros(n)
     by_turn = np.stack([np.stack([zero, z, -y], -1), np.stack([-z, zero, x], -1), np.stack([y, -x, zero], -1)], -2)
-    return np.concatenate([by_turn, np.broadcast_to(np.eye(3), (n, 3, 3)), back, turned[:, :, None]], axis=2)
+    columns = by_turn, np.broadcast_to(np.eye(3), (n, 3, 3)), back, turned[:, :, None], by_delay[:, :, None]
+    return np.concatenate(columns, axis=2)
 
 
 def _tukey(lengths: Array) -> Array:
@@ -134,13 +175,13 @@ def _tukey(lengths: Array) -> Array:
 
 
 def _covariance(design: Array, weight: Array, residual: Array, normal: Array, t_ns: NDArray[np.int64]) -> Array:
-    """Return N⁻¹ (Σ g gᵀ) N⁻¹, with g the sums of Aᵀ w r over each CLUSTER_S (Liang and Zeger 1986).
-
-    It holds also where residuals within a cluster have a common error.
-    """
-    cluster = np.unique(t_ns // round(CLUSTER_S * NS_PER_S), return_inverse=True)[1]
+    """Return N⁻¹ (Σ g gᵀ) N⁻¹, with g the sums of Aᵀ w r over each CLUSTER_S, widened where passes differ by more."""
     scores = np.einsum("nik,n,ni->nk", design, weight, residual, optimize=True)
-    sums = np.stack([np.bincount(cluster, column) for column in scores.T], axis=1)
-    clusters = len(sums)
+    seconds = np.unique(t_ns // round(CLUSTER_S * NS_PER_S), return_inverse=True)[1]
+    sums = np.stack([np.bincount(seconds, column) for column in scores.T], axis=1)
     inverse = np.linalg.pinv(normal, rcond=1e-14, hermitian=True)
-    return np.asarray(inverse @ (sums.T @ sums) @ inverse * clusters / max(clusters - 1, 1))
+    covariance = inverse @ (sums.T @ sums) @ inverse * len(sums) / max(len(sums) - 1, 1)
+    between = leave_one_out(design, weight, scores, normal, time_groups(t_ns))
+    least = np.maximum(np.diag(covariance), 1e-30)
+    wider = np.sqrt(np.maximum(between / least, 1.0))
+    return np.asarray(covariance * wider[:, None] * wider)

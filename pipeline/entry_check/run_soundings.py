@@ -94,6 +94,7 @@ class EntrySource:
     mbes_latency_s: float
     ins_latency_s: float
     convergence_rad: float = 0.0  # grid north less true north, clockwise, in the CRS of the software
+    azimuth_rad: float = 0.0  # of the pool's y axis, clockwise from true north
 
 
 @dataclass(frozen=True)
@@ -134,6 +135,7 @@ def run_side(run: FinishedRun) -> RunSide:
             laser=mount_of(session.laser.mount),
             mbes_latency_s=session.sonar.latency_s,
             ins_latency_s=session.ins.latency_s,
+            azimuth_rad=float(np.radians(origin["azimuth_deg"])),
         ),
         latitude_deg=latitude,
         longitude_deg=longitude,

@@ -69,8 +69,8 @@ class FileSide:
         The points.
     placing
         How its coordinates were read.
-    rows, lost
-        Number of rows with three numbers, and of rows without.
+    near, rows, lost
+        Number of rows near the track, of which not all may be taken; of rows with three numbers, and without.
     depths
         Whether its heights are depths below the water.
     cell_m
@@ -79,6 +79,7 @@ class FileSide:
 
     points: FilePoints
     placing: Placing
+    near: int
     rows: int
     lost: int
     depths: bool
@@ -136,7 +137,8 @@ def file_side(path: Path, crs: str | None, side: RunSide) -> FileSide:
     step_m = max(source.step_m, _step_m(first, placing))
     if step_m > COARSEST_M * 1.01:
         raise RawDataError(f"{path}: its coordinates are whole steps of {step_m:.2g} m; export 3 decimals of a metre")
-    return FileSide(FilePoints(points, row, step_m / 2), placing, rows, lost, source.depths, _cell_m(first, placing))
+    taken = FilePoints(points, row, step_m / 2)
+    return FileSide(taken, placing, near.seen, rows, lost, source.depths, _cell_m(first, placing))
 
 
 def _placing(path: Path, crs: str, coordinates: Array, side: RunSide, geographic: bool | None) -> Placing:
@@ -210,13 +212,14 @@ class _Near:
         reach = side.soundings.reach_m + MARGIN_M
         self.low, self.high, self.frame = track.min(axis=0) - reach, track.max(axis=0) + reach, side.frame
         self.kept: list[tuple[Array, NDArray[np.int64]]] = []
-        self.every, self.count = 1, 0
+        self.every, self.count, self.seen = 1, 0, 0
 
     def add(self, points: Array, first_row: int) -> None:
         """Add points (n, 3), the file's from row ``first_row`` on."""
         with np.errstate(invalid="ignore"):
             good = ((points[:, :2] > self.low) & (points[:, :2] < self.high)).all(axis=1) & np.isfinite(points[:, 2])
         row = first_row + np.flatnonzero(good)
+        self.seen += len(row)
         self.kept.append(self._thinned(points[good], row))
         self.count += len(self.kept[-1][1])
         while self.count > MOST_POINTS:

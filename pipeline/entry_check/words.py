@@ -7,94 +7,132 @@ from typing import Any
 import numpy as np
 
 from pipeline.console import plural, signed
-from pipeline.entry_check.answer import TOLERANCE_DEG, TOLERANCE_M, Answer
+from pipeline.entry_check.answer import Answer
 from pipeline.entry_check.check import EntryCheck
+from pipeline.entry_check.explanations import PART_NAMES, Explanation
+from pipeline.entry_check.judging import TOLERANCE_DEG, TOLERANCE_M
+from pipeline.language.chosen import translated
+from pipeline.language.letters import has_wide
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.mount import Mounted, setting_change
 from pipeline.text_table import text_table
 
 WIDTH = 100
-SCATTER_M = 0.01
-VERTICAL = "z"
-
-
-def verdict_of(answer: Answer) -> str:
-    """Return right, wrong, undecidable or uncertain."""
-    if not answer.certain:
-        return "uncertain"
-    if answer.is_right:
-        return "right"
-    return "undecidable" if len(answer.explanations) > 1 else "wrong"
+BULLET = "  - "
+COARSE_M = 0.002
+SHOWN_EXCESS_M = 0.002  # a smaller scatter beyond rounding is not worth a word
 
 
 def check_text(check: EntryCheck) -> str:
     """Return the answer as text for the screen."""
-    lines = [line for text in _answer(check) for line in textwrap.wrap(text, WIDTH, subsequent_indent="  ")]
+    lines = [line for text in _answer(check) for line in _wrapped(text, "  ")]
     lines += ["", *_table(check), ""]
-    lines += [line for text in _basis(check) for line in textwrap.wrap(text, WIDTH)]
+    lines += [line for text in _basis(check) for line in _wrapped(text, "")]
     return "\n".join(lines)
 
 
+def _wrapped(text: str, indent: str) -> list[str]:
+    """Return a sentence in lines, in the language of this process; one whose letters are wide stays one line."""
+    bullet, text = (BULLET, text.removeprefix(BULLET)) if text.startswith(BULLET) else ("", text)
+    words = translated(text)
+    if has_wide(words):
+        return [bullet + words]
+    return textwrap.wrap(bullet + words, WIDTH, subsequent_indent=" " * len(bullet) or indent)
+
+
+def _joined(explanation: Explanation) -> str:
+    """Return its sentences; what begins with the part's name is translated part by part."""
+    return "; ".join("".join(map(translated, _named(words))) for words in explanation.words)
+
+
+def _named(words: str) -> tuple[str, ...]:
+    name = next((name for name in PART_NAMES if words.startswith(name)), "")
+    return (name, words.removeprefix(name)) if name else (words,)
+
+
 def _answer(check: EntryCheck) -> Iterator[str]:
-    answer, verdict = check.answer, verdict_of(check.answer)
-    if verdict == "uncertain":
-        yield "Cannot be told: the soundings determine the entered mount too poorly. Export more, with 3 decimals."
-        return
-    if verdict == "right":
-        judged = np.array(answer.way.judged)
-        but = "" if judged.all() else " (z not judged: the heights are above another surface)"
-        most_mm = 1000 * float(np.abs(answer.lever_m[judged]).max())
-        yield f"Entered rightly: within {max(most_mm, 0.1):.1f} mm, {max(answer.angle_deg, 0.001):.3f}°{but}."
-        return
-    if verdict == "undecidable":
-        yield "Not entered rightly. These mistakes give the same numbers, and the soundings cannot tell which it was:"
-        yield from (f"  - {'; '.join(one.words)}" for one in answer.explanations)
-        return
-    if answer.explanations:
-        yield f"Not entered rightly: {'; '.join(answer.explanations[0].words)}."
-        return
-    yield from _unexplained(answer)
-
-
-def _unexplained(answer: Answer) -> Iterator[str]:
-    if answer.rotation_right:
-        x, y, z = (signed(value, 3) for value in answer.lever_m)
-        yield (
-            f"Not entered rightly: the angles are right, but the lever arm is off by x {x}, y {y}, z {z} m (starboard, "
-            "forward, up), and no known mistake explains it."
-        )
-        yield (
-            "It may be counted from another point than the INS's; or all positions are shifted so (another datum, or "
-            "the INS's own lever arm): passes of one heading cannot tell these apart."
-        )
+    answer = check.answer
+    said = [_joined(one) for one in answer.explanations]
+    if answer.verdict == "right":
+        yield f"Entered rightly: within {_within(answer)}."
+    elif answer.verdict == "right_but" and len(said) == 1:
+        yield f"Entered rightly, but {said[0]}."
+    elif answer.verdict == "right_but":
+        yield "Entered rightly, but one of these is wrong, and the soundings cannot tell which:"
+        yield from (BULLET + words for words in said)
+    elif answer.verdict == "wrong":
+        yield f"Not entered rightly: {said[0]}."
+    elif answer.verdict == "uncertain":
+        yield from _uncertain(check)
+    elif any(one.mount_is_right for one in answer.explanations):
+        yield "Cannot be told: either was the mount entered wrongly, or it is right and something else is wrong:"
+        yield from (BULLET + words for words in said)
     else:
-        what = "the lever arm is right, but the angles are" if answer.lever_right else "angles and lever arm are"
-        yield f"Not entered rightly: {what} off, and no known mistake explains it. Compare the numbers one by one:"
+        yield "Not entered rightly. These mistakes give the same numbers, and the soundings cannot tell which it was:"
+        yield from (BULLET + words for words in said)
+    yield from _about_z(answer)
+    if answer.excess_m > SHOWN_EXCESS_M:
+        yield (
+            f"The soundings scatter by {1000 * answer.excess_m:.0f} mm beyond rounding. The software traces rays "
+            "otherwise (another sound speed or cast), it has other positions or attitudes than the run, or its "
+            "soundings were smoothed."
+        )
 
 
-def _rows(check: EntryCheck) -> Iterator[tuple[str, str, float, float, float, float, bool]]:
-    """Yield name, unit, calibrated and found value, difference, sigma of each setting, and whether it is judged."""
+def _within(answer: Answer) -> str:
+    judged = slice(0, 2) if answer.way.any_height else slice(0, 3)
+    most_mm = 1000 * float(np.abs(answer.lever_m[judged]).max())
+    return f"{max(most_mm, 0.1):.1f} mm, {max(answer.angle_deg, 0.001):.3f}°"
+
+
+def _uncertain(check: EntryCheck) -> Iterator[str]:
+    answer = check.answer
+    most_deg = answer.angle_deg + answer.angle_limit_deg
+    most_m = float((np.abs(answer.lever_m) + answer.lever_limit_m)[: 2 if answer.way.any_height else 3].max())
+    yield (
+        "Cannot be told closely enough: the calibrated mount explains the soundings, but so does any other within "
+        f"{most_deg:.3f}° and {most_m:.3f} m. A larger mistake is excluded."
+    )
+    if answer.explanations[0].words:
+        yield f"Besides: {_joined(answer.explanations[0])}."
+    if check.file.points.rounding_m > COARSE_M:
+        yield "The file rounds its places to a centimetre or more: export text with 3 decimals."
+    elif answer.excess_m <= SHOWN_EXCESS_M:
+        yield "Export more soundings, of all passes."
+
+
+def _about_z(answer: Answer) -> Iterator[str]:
+    """Yield how well z is known where a shift of all heights is free."""
+    if answer.way.any_height and answer.verdict in ("right", "right_but", "uncertain"):
+        within_m = abs(float(answer.lever_m[2])) + float(answer.lever_limit_m[2])
+        yield (
+            f"z is known to {within_m:.3f} m only: the heights are above another surface, and roll and pitch alone "
+            "tell z from it."
+        )
+
+
+def _rows(check: EntryCheck) -> Iterator[tuple[str, str, float, float, float, float]]:
+    """Yield name, unit, calibrated and found value, difference and sigma of each setting."""
     fitted, total = check.answer.way.fitted, check.source.total
     found = Mounted(fitted.R_body_from_mbes, fitted.lever_arm_m)
     wanted, values, sigmas = total.settings(), found.settings(), found.sigmas(fitted.covariance[:6, :6])
     for name, _, key, unit in PARAMETERS:
-        judged = name not in "xyz" or check.answer.way.judged["xyz".index(name)]
-        yield name, unit, wanted[key], values[key], setting_change(values, wanted, key), sigmas[key], judged
+        yield name, unit, wanted[key], values[key], setting_change(values, wanted, key), sigmas[key]
 
 
 def _table(check: EntryCheck) -> list[str]:
     rows = []
-    for name, unit, wanted, found, difference, sigma, judged in _rows(check):
-        digits, mark = (4, "°") if unit == "deg" else (4, "m")
-        shown = [f"{found:.{digits}f}", signed(difference, digits), f"{sigma:.{digits}f}"] if judged else ["-"] * 3
-        rows.append([name, f"{wanted:.{digits}f}", *shown, mark])
+    for name, unit, wanted, found, difference, sigma in _rows(check):
+        mark = "°" if unit == "deg" else "m"
+        rows.append([name, f"{wanted:.4f}", f"{found:.4f}", signed(difference, 4), f"{sigma:.4f}", mark])
     return text_table("<6>12>12>12>10 <2", ["mount", "calibrated", "found", "difference", "sigma", ""], rows)
 
 
 def _basis(check: EntryCheck) -> Iterator[str]:
     pairs, file, fitted = check.pairs, check.file, check.answer.way.fitted
+    taken = f", of which {len(file.points.row):,} were taken" if len(file.points.row) < file.near else ""
     yield (
-        f"{len(file.points.row):,} of the file's {file.rows:,} soundings lie near the track; {pairs.found:,} of "
+        f"{file.near:,} of the file's {file.rows:,} soundings lie near the track{taken}; {pairs.found:,} of "
         f"the run's {len(check.run.soundings.t_ns):,} that were taken were found again among them "
         f"({100 * pairs.share:.0f} %; by chance {100 * pairs.chance:.1f} %)."
     )
@@ -104,13 +142,6 @@ def _basis(check: EntryCheck) -> Iterator[str]:
         f"Scatter of the found soundings: {1000 * fitted.scatter_m:.1f} mm in each coordinate; tolerance "
         f"{TOLERANCE_DEG:g}° and {1000 * TOLERANCE_M:g} mm, and three sigmas."
     )
-    if fitted.scatter_m > SCATTER_M:
-        yield (
-            "So much is no rounding: the software traces rays otherwise, with another sound speed or cast, or it has "
-            "other positions and attitudes than the run."
-        )
-    if check.heights_differ:
-        yield "Heights are above another surface than the ellipsoid: z was not judged. Ellipsoidal heights would do."
     if file.lost:
         yield f"Left out: {plural(file.lost, 'row')} without three numbers."
 
@@ -121,17 +152,21 @@ def check_json(check: EntryCheck) -> dict[str, Any]:
     return {
         "schema": 1,
         "session": check.run.session,
-        "answer": verdict_of(answer),
+        "answer": answer.verdict,
         "explanations": [{"codes": list(one.keys), "words": list(one.words)} for one in answer.explanations],
         "parameters": [
-            dict(zip(("parameter", "unit", "calibrated", "found", "difference", "sigma", "judged"), row, strict=True))
+            dict(zip(("parameter", "unit", "calibrated", "found", "difference", "sigma"), row, strict=True))
             for row in _rows(check)
         ],
         "difference_deg": answer.angle_deg,
         "difference_m": [float(value) for value in answer.lever_m],
+        "limit_deg": answer.angle_limit_deg,
+        "limit_m": [float(value) for value in answer.lever_limit_m],
+        "other_heights": answer.way.any_height,
         "rotation_right": answer.rotation_right,
         "lever_arm_right": answer.lever_right,
         "scatter_m": answer.way.fitted.scatter_m,
+        "excess_m": answer.excess_m,
         "crs": file.placing.name,
         "swapped": file.placing.swapped,
         "found_by": pairs.how,

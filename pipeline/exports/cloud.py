@@ -17,6 +17,7 @@ from laspy.header import GpsTimeType
 
 import pipeline
 from pipeline.atomic_files import flush_file, replacing
+from pipeline.exports.cloud_file import points_file
 from pipeline.exports.cloud_frame import CloudFrame
 from pipeline.exports.cloud_points import CalibratedPoints, PlacedPoints
 from pipeline.exports.explanation import REJECTED
@@ -46,7 +47,10 @@ def write_cloud(path: Path, points: CalibratedPoints, frame: CloudFrame, origin:
     header = _header(points, frame, origin)
     number = 0
     with replacing(path) as beside:
-        with laspy.open(beside, mode="w", header=header, do_compress=path.suffix == ".laz") as file:
+        with (
+            points_file(beside) as stream,
+            laspy.open(stream, mode="w", header=header, do_compress=path.suffix == ".laz", closefd=False) as file,
+        ):
             for placed in points.batches():
                 file.write_points(_records(placed, frame, header))
                 number += len(placed.t_ns)

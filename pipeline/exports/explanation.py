@@ -19,7 +19,16 @@ def heading(target: Target, mounting: Mounting) -> list[str]:
         f"Session {origin.session}, run {origin.run}, {SENSOR_WORDS[mounting.sensor]}: {origin.kind}. "
         f"poolcal {pipeline.__version__}",
     ]
-    return lines + rejection(mounting)
+    return [*lines, *_evidence(mounting), *rejection(mounting)]
+
+
+def _evidence(mounting: Mounting) -> list[str]:
+    """Return what tells a sheet found in an office apart from another: verdict, time of the passes, digest."""
+    origin = mounting.origin
+    verdict = ["Verdict: accepted."] if origin.rejected is None else []
+    begins = [] if origin.start_utc is None else [f"First pass: {origin.start_utc}."]
+    digest = [] if origin.digest is None else [f"SHA-256 of calibration.json: {origin.digest}"]
+    return [*([" ".join([*verdict, *begins])] if verdict or begins else []), *digest]
 
 
 def rejection(mounting: Mounting) -> list[str]:

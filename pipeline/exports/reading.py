@@ -6,7 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from pipeline.errors import ConfigError
-from pipeline.exports.convention import Numbers
+from pipeline.exports.convention import Convention, Numbers
 
 ROLES = ("x", "y", "z", "roll", "pitch", "yaw")
 
@@ -53,6 +53,13 @@ def whole_lines(text: str, where: str) -> list[str]:
     if text and not text.endswith("\n"):
         raise ConfigError(f"{where}: ends within a line: it may be cut off; end the last line")
     return text.splitlines()
+
+
+def written_for(convention: Convention, role: str, value: float, decimals: int) -> str:
+    """Return a number of a mount as text; a heading from 0 to 360° that rounds to 360 is 0."""
+    if role == "yaw" and convention.zero_to_360:
+        value = round(value, decimals) % 360.0
+    return written(value, decimals)
 
 
 def written(value: float, decimals: int) -> str:

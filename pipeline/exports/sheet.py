@@ -8,12 +8,14 @@ import re
 import textwrap
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 from pipeline.errors import ConfigError
+from pipeline.exports.convention import Convention
 from pipeline.exports.explanation import explanation, heading, sigmas_of
 from pipeline.exports.mounting import Mounting, sigma_text
-from pipeline.exports.reading import ROLES, number, numbers_of, whole_lines, written
-from pipeline.exports.target import Options, Target
+from pipeline.exports.reading import ROLES, number, numbers_of, whole_lines, written_for
+from pipeline.exports.target import Options, Read, Target
 from pipeline.mount import Mounted
 
 DECIMALS = 4  # of degrees and metres: rounding is below 0.00005 degrees, 0.05 mm
@@ -45,6 +47,37 @@ class Sheet:
     of: Callable[[Mounting], Mounted] = vessel_mount
     not_known: dict[str, Callable[[Mounting, Options], str | None]] = field(default_factory=dict)
 
+    def target(
+        self,
+        name: str,
+        title: str,
+        convention: Convention,
+        writes: str = "entry sheet",
+        read: Read | None = None,
+        **others: Any,
+    ) -> Target:
+        """Return the target whose form is this sheet.
+
+        Parameters
+        ----------
+        name, title, convention, writes
+            As in Target.
+        read
+            Reads the mount from a text; None: from the sheet's fields.
+        others
+            Other attributes of Target. The sensor is the sonar if they do not tell another.
+        """
+        return Target(
+            name=name,
+            title=title,
+            writes=writes,
+            suffix=".txt",
+            convention=convention,
+            write=self.write,
+            read=read or self.read,
+            **{"sensor": "mbes", **others},
+        )
+
     def write(self, target: Target, mounting: Mounting, options: Options) -> str:
         """Return the sheet's text."""
         values = target.convention.numbers(self.of(mounting), options.order).by_role()
@@ -57,7 +90,9 @@ class Sheet:
                 unit = "m" if role in ("x", "y", "z") else "°"
                 label = f"{name} ({senses[role]}):"
                 in_words = self.not_known[role](mounting, options) if role in self.not_known else None
-                value = f"{written(values[role], DECIMALS):>10} {unit}" if in_words is None else f"  {in_words}"
+                value = f"{written_for(target.convention, role, values[role], DECIMALS):>10} {unit}"
+                if in_words is not None:
+                    value = f"  {in_words}"
                 lines.append(f"  {label:<58}{value}   {sigma_text(sigmas, role)}".rstrip())
         if self.extra is not None:
             lines += ["", *self.extra(target, mounting, options)]

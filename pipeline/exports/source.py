@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.atomic_files import sha256
 from pipeline.config.mount import Mount
 from pipeline.config.session import Calibrated, SessionConfig
 from pipeline.errors import ArtefactError, ConfigError
@@ -55,6 +56,7 @@ def mounting_of(run: FinishedRun, sensor: Calibrated | None, although_rejected: 
             rejected=None if rejected is None else tuple(map(one_line, rejected)),
             held=tuple(map(str, run.result.get("held", ()))),
             start_utc=str(passes[0]["start_utc"]) if passes else None,
+            digest=sha256(run.path / "report" / "calibration.json"),
         )
         if sensor in (None, calibrated):
             mounting = _calibrated(run.path, run.result[calibrated], calibrated, origin)

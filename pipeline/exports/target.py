@@ -12,6 +12,8 @@ from pipeline.exports.mounting import Mounting
 from pipeline.exports.orders import ORDERS
 from pipeline.mount import Mounted
 
+Read = Callable[["Target", str, str, "Options"], Mounted]
+Write = Callable[["Target", Mounting, "Options"], str]
 SERIAL = re.compile(r"[A-Za-z0-9_.-]{1,50}")
 
 
@@ -62,8 +64,8 @@ class Target:
     writes: str
     suffix: str
     convention: Convention
-    write: Callable[["Target", Mounting, Options], str]
-    read: Callable[["Target", str, str, Options], Mounted]
+    write: Write
+    read: Read
     sensor: Calibrated | None = None
     counts_from: Literal["vessel", "ins", "water"] = "vessel"
     uses: frozenset[str] = frozenset()

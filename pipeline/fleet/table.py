@@ -8,12 +8,16 @@ from pipeline.console import plural
 from pipeline.fleet.answer import ACCEPTED, BUG, COULD_NOT_RUN, REJECTED, Answer
 from pipeline.fleet.logs import log_of
 from pipeline.fleet.session_list import FleetSession, shown
+from pipeline.language import letters
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.results.history import History
 from pipeline.text_table import text_table
 
-LAYOUT = "<12  <8" + " >8" * 6 + "  <12 >8  <1"
+LAYOUT = "<8" + " >8" * 3 + " >6" * 3 + "  <12"  # behind the session's name
+WIDTH, LEAST_LABEL, MOST_SINCE = 100, 12, 17  # columns
+DECIMALS = {"deg": 4, "m": 3}  # 0.0001° is 0.05 mm at 30 m
 MOST_NAMED = 3  # stages; of more than these the table shows the first and the last
+UP_TO_DATE = "up to date"
 BAD = {REJECTED: "rejected", COULD_NOT_RUN: "refused", BUG: "bug"}
 COUNTED = {ACCEPTED: "accepted", REJECTED: "rejected", COULD_NOT_RUN: "could not run", BUG: "ended by a bug"}
 
@@ -35,7 +39,13 @@ class Outcome:
         ran = ", ".join(answer.ran)
         if len(answer.ran) > MOST_NAMED:
             ran = f"{answer.ran[0]} to {answer.ran[-1]}"
-        return "; ".join([f"ran {ran}" if ran else "up to date", *(f"{kind} not drawn" for kind in answer.not_drawn)])
+        return "; ".join([f"ran {ran}" if ran else UP_TO_DATE, *(f"{kind} not drawn" for kind in answer.not_drawn)])
+
+    @property
+    def verdict(self) -> str:
+        """The verdict, *in part* for one that is accepted in part; without one, why there is none."""
+        word = BAD.get(self.answer.status, self.answer.verdict)
+        return word.removeprefix("accepted ")
 
     @property
     def complaint(self) -> str:
@@ -50,6 +60,8 @@ class Outcome:
     def line(self) -> str:
         """The line about the end of the session."""
         words = self.complaint or f"{self.session.label}: {self.answer.verdict}"
+        if self.done == UP_TO_DATE:
+            return f"{words}; up to date ({self.seconds:.1f} s)"  # one sentence, for the translation
         done = f"; {self.done}" if self.answer.status in (ACCEPTED, REJECTED) else ""
         return f"{words}{done} ({self.seconds:.1f} s)"
 
@@ -62,7 +74,7 @@ def movements(history: History, folder: Path) -> dict[Path, str]:
 
 
 def outcome_table(outcomes: Sequence[Outcome], moved: Mapping[Path, str]) -> list[str]:
-    """Return the table's lines, and below them one for each session that has no accepted calibration.
+    """Return the table's lines, and below them what to know of a session: no accepted calibration, a movement, a fault.
 
     Parameters
     ----------
@@ -73,20 +85,40 @@ def outcome_table(outcomes: Sequence[Outcome], moved: Mapping[Path, str]) -> lis
     """
     units = {"deg": "°", "m": "m"}
     heads = [f"{name}, {units[unit]}" for name, *_, unit in PARAMETERS]
-    rows = []
+    rows, below = [], []
     for outcome in outcomes:
-        answer = outcome.answer
-        values = [f"{answer.mount[key]:.4f}" if key in answer.mount else "-" for *_, key, _ in PARAMETERS]
-        since = moved.get(outcome.session.run, "-") if answer.status == ACCEPTED else "-"
-        row = (outcome.session.label, answer.verdict or "-", *values, since, f"{outcome.seconds:.1f} s", outcome.done)
-        rows.append(row)
-    table = text_table(LAYOUT, ("session", "verdict", *heads, "since before", "time", "done"), rows)
-    complaints = [outcome.complaint for outcome in outcomes if outcome.complaint]
-    return [*table, *([""] if complaints else []), *complaints]
+        mount = outcome.answer.mount
+        values = [f"{mount[key]:.{DECIMALS[unit]}f}" if key in mount else "-" for *_, key, unit in PARAMETERS]
+        since = moved.get(outcome.session.run, "-") if outcome.answer.status == ACCEPTED else "-"
+        short, _, what = since.partition(": ")
+        rows.append((outcome.verdict, *values, since if len(since) <= MOST_SINCE else short))
+        where = outcome.session.label
+        below += [outcome.complaint] if outcome.complaint else []
+        below += [f"{where}: has moved since the session before: {what}"] if what else []
+        below += [f"{where}: {kind} not drawn" for kind in outcome.answer.not_drawn]
+    head = ("verdict", *heads, "since before")
+    room = WIDTH - 1 - max(map(letters.width, text_table(LAYOUT, head, rows)))
+    labels = [_cut(outcome.session.label, max(room, LEAST_LABEL)) for outcome in outcomes]
+    whole = ((label, *row) for label, row in zip(labels, rows, strict=True))
+    table = text_table(f"<{LEAST_LABEL} {LAYOUT}", ("session", *head), whole)
+    return [*table, *([""] if below else []), *below]
+
+
+def _cut(label: str, room: int) -> str:
+    """Return a session's name, cut off in front if it is too long: its end tells sessions apart.
+
+    >>> _cut("data/boat_a/2026-05-12", 17), _cut("2026-05-12", 17)
+    ('…oat_a/2026-05-12', '2026-05-12')
+    """
+    if letters.width(label) <= room:
+        return label
+    return next(f"…{end}" for start in range(1, len(label) + 1) if letters.width(end := label[start:]) < room)
 
 
 def count_line(outcomes: Sequence[Outcome]) -> str:
     """Return the sentence with the numbers of sessions by what came out."""
     numbers = {words: sum(one.answer.status == status for one in outcomes) for status, words in COUNTED.items()}
     parts = ", ".join(f"{number} {words}" for words, number in numbers.items() if number)
-    return f"{plural(len(outcomes), 'session')}: {parts}."
+    same = sum(one.answer.status in (ACCEPTED, REJECTED) and not one.answer.ran for one in outcomes)
+    whole = f"{plural(len(outcomes), 'session')}: {parts}"
+    return f"{whole}; {same} up to date." if same else f"{whole}."

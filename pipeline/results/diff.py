@@ -37,7 +37,7 @@ def run_difference(first: FinishedRun, second: FinishedRun, tolerances: Toleranc
         for run in (first, second)
     ]
     difference: dict[str, Any] = {"schema": 1, "a": heads[0], "b": heads[1]}
-    difference["config"] = list(_changes(first.settings.as_json(), second.settings.as_json()))
+    difference["config"] = list(_changes(_computed_with(first), _computed_with(second)))
     difference["inputs"] = list(_changes(first.result["inputs"], second.result["inputs"]))
     difference["software"] = list(_changes(first.result["software"], second.result["software"]))
     difference["counts"] = list(_count_changes(first, second))
@@ -54,6 +54,11 @@ def run_difference(first: FinishedRun, second: FinishedRun, tolerances: Toleranc
     difference["sentence"] = answer_sentence(difference)
     difference["visible"] = visible_sentence(difference)
     return difference
+
+
+def _computed_with(run: FinishedRun) -> dict[str, Any]:
+    """Return the settings that a result depends on: all but ``about``, which only the certificate shows."""
+    return {key: value for key, value in run.settings.as_json().items() if key != "about"}
 
 
 def _changes(first: Mapping[str, Any], second: Mapping[str, Any]) -> Iterator[Row]:

@@ -44,13 +44,16 @@ def refuse_output(
     suffix = suffix or option.replace("--", ".")
     if file.suffix != suffix:
         raise ConfigError(f"{option} {file}: name a file that ends in {suffix}")
-    if file.exists() and not file.is_file():
-        raise ConfigError(f"{option} {file}: is no file; name another")
-    for run_folder in runs:
-        if file.resolve().is_relative_to(run_folder.resolve()):
-            raise ConfigError(f"{option} {file}: lies in the folder {run_folder}; name a file elsewhere")
-    if (begins or holds) and file.is_file():
-        with writing(file), file.open("rb") as there:
-            head = there.read(HEAD_BYTES)
-        if not head.startswith(begins) or holds not in head:
-            raise ConfigError(f"{option} {file}: is there, and poolcal did not write it; name another file")
+    with writing(file):
+        if not file.parent.is_dir():
+            raise ConfigError(f"{option} {file}: there is no folder {file.parent}; make it, or name another file")
+        if file.exists() and not file.is_file():
+            raise ConfigError(f"{option} {file}: is no file; name another")
+        for run_folder in runs:
+            if file.resolve().is_relative_to(run_folder.resolve()):
+                raise ConfigError(f"{option} {file}: lies in the folder {run_folder}; name a file elsewhere")
+        if (begins or holds) and file.is_file():
+            with file.open("rb") as there:
+                head = there.read(HEAD_BYTES)
+            if not head.startswith(begins) or holds not in head:
+                raise ConfigError(f"{option} {file}: is there, and poolcal did not write it; name another file")

@@ -8,6 +8,7 @@ from typing import Any
 import yaml
 
 from pipeline.atomic_files import sha256, write_text
+from pipeline.config.about import About
 from pipeline.config.fill_in import refuse_unfilled
 from pipeline.config.load import load_pool, load_session, session_yaml, stated_keys
 from pipeline.config.pool import PoolConfig
@@ -41,12 +42,13 @@ class Settings:
         """Return every setting by the name under which a stage's Config asks for it."""
         return settings_by_name(self.pool, self.session)
 
-    def is_session_changed(self) -> bool:
-        """Return whether session.yaml is no longer the file that was read; False if it is out of reach."""
-        digest = self.files.get("session")
+    def is_about_changed(self) -> bool:
+        """Return whether ``about`` in session.yaml is another than the run's; False if it cannot be read."""
+        path = self.session_folder / SESSION_YAML
         try:
-            return digest is not None and sha256(self.session_folder / SESSION_YAML) != digest
-        except ArtefactError:
+            block = read_yaml(path).get("about") or {}
+            return isinstance(block, dict) and parse(About, block, str(path)) != self.session.about
+        except ConfigError:
             return False
 
     def as_json(self) -> dict[str, Any]:

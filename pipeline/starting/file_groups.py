@@ -97,6 +97,8 @@ def survey_group(
         settings = settings.model_copy(update={"sound_speed_m_s": _SPEED_M_S})
         surveyed, _ = survey_sensor(sensor, settings, folder, copies)
     left_out = [LeftOut(file.name, why) for file in surveyed if (why := _unusable(file))]
+    gone = set(names) - {file.name for file in surveyed}
+    left_out += [LeftOut(name, "is there no longer; was it moved meanwhile?") for name in gone]
     good = tuple(file for file in surveyed if not _unusable(file))
     if not good:
         return None, left_out

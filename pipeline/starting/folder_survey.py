@@ -15,6 +15,7 @@ from pipeline.starting.file_groups import FileGroup, survey_group
 from pipeline.starting.file_patterns import patterns_for
 from pipeline.starting.folder_files import LeftOut, sort_files
 from pipeline.starting.laser_frame import FrameProposal, propose_frame
+from pipeline.starting.two_sessions import two_session_doubts
 from pipeline.starting.weeks import with_weeks
 
 
@@ -81,7 +82,7 @@ def survey_folder(folder: Path) -> FolderSurvey:
         accuracy=tuple(patterns_for(files.accuracy, folder)),
         casts=tuple(casts),
         left_out=tuple(sorted(left_out)),
-        doubts=tuple(twice),
+        doubts=(*twice, *two_session_doubts(one)),
         track=track,
         frame=propose_frame(one["laser"], folder, track) if "laser" in one else None,
     )

@@ -9,6 +9,7 @@ from pipeline.config.fill_in import Unfilled, what
 from pipeline.console import plural
 from pipeline.starting.file_groups import FileGroup
 from pipeline.starting.folder_survey import FolderSurvey
+from pipeline.starting.left_out_words import left_out_lines
 from pipeline.starting.span_words import span_words
 from pipeline.text_table import text_table
 
@@ -24,9 +25,7 @@ def found_text(survey: FolderSurvey) -> str:
     lines += [f"Look: {doubt}" for doubt in survey.doubts]
     if survey.left_out:
         lines += ["", f"Not used: {plural(len(survey.left_out), 'file')}"]
-        lines += [f"  {one.name}: {one.why}" for one in survey.left_out[:MOST_LINES]]
-        more = len(survey.left_out) - MOST_LINES
-        lines += [f"  and {plural(more, 'file')} more, in session.yaml"] if more > 0 else []
+        lines += [f"  {line}" for line in left_out_lines(survey.left_out, MOST_LINES)]
     return "\n".join(lines)
 
 

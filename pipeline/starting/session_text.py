@@ -10,11 +10,12 @@ from pipeline.readers.crs import LASER_FRAME
 from pipeline.starting.assumed import about, assumed
 from pipeline.starting.file_groups import FileGroup
 from pipeline.starting.folder_survey import FolderSurvey
+from pipeline.starting.left_out_words import left_out_lines
 from pipeline.starting.presets import preset_of, presets_for
 from pipeline.starting.span_words import span_words
-from pipeline.starting.yaml_words import beside, capped, comment, file_list, list_in_brackets, scalar, to_fill_in
+from pipeline.starting.yaml_words import beside, comment, file_list, list_in_brackets, scalar, to_fill_in
 
-MOST_LEFT_OUT = 40  # files that are listed with their reasons
+MOST_LEFT_OUT = 40  # lines with files and their reasons
 _NAMES = {"ins": "the INS", "laser": "the laser", "mbes": "the sonar"}
 _HEAD = (
     f"A session of poolcal, begun by poolcal init from the files in this folder. {MARK} marks what only a person "
@@ -117,10 +118,10 @@ def _accuracy(survey: FolderSurvey) -> Iterator[str]:
     group = survey.chosen("ins")
     if not survey.accuracy:
         return
+    yield from comment("Accuracy files, which belong to an SBET:", "  ")
     if group is not None and group.kind.format == "sbet":
         yield f"  accuracy: {file_list(survey.accuracy)}".replace(": \n", ":\n")
     else:
-        yield from comment("Accuracy files, which belong to an SBET:", "  ")
         yield f"  #   accuracy: {list_in_brackets(survey.accuracy)}"
 
 
@@ -153,6 +154,5 @@ def _left_out(survey: FolderSurvey) -> Iterator[str]:
         return
     yield ""
     yield "# Files that are not used, and why:"
-    words = [f"  {one.name}: {one.why}" for one in survey.left_out]
-    for line in capped(words, MOST_LEFT_OUT, "file"):
-        yield from comment(line)
+    for line in left_out_lines(survey.left_out, MOST_LEFT_OUT):
+        yield from comment(f"  {line}")

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import yaml
 
 from pipeline.config.fill_in import MARK, what
-from pipeline.console import plural, printable
+from pipeline.console import printable
 
 _COMMENT_COLUMN = 30  # at which comments beside keys begin
 _LONGEST = 120
@@ -82,9 +82,3 @@ def beside(line: str, words: str) -> str:
     whole = f"{line:<{_COMMENT_COLUMN}}# {words}"
     indent = " " * (len(line) - len(line.lstrip()))
     return whole if len(whole) <= _LONGEST else "\n".join([*comment(words, indent), line])
-
-
-def capped(lines: Sequence[str], most: int, noun: str) -> list[str]:
-    """Return at most ``most`` lines, and one that says how many more there are."""
-    more = len(lines) - most
-    return [*lines] if more <= 0 else [*lines[:most], f"and {plural(more, noun)} more"]

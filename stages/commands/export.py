@@ -14,7 +14,7 @@ from pipeline.errors import ConfigError
 from pipeline.exports.cloud import CLOUDS, write_cloud
 from pipeline.exports.cloud_frame import cloud_frame
 from pipeline.exports.cloud_points import CalibratedPoints
-from pipeline.exports.mounting import Mounting, VesselFrame, vector
+from pipeline.exports.mounting import SENSOR_WORDS, Mounting, VesselFrame, vector
 from pipeline.exports.registry import list_text, target_named
 from pipeline.exports.source import mounting_of
 from pipeline.exports.target import Options
@@ -83,7 +83,8 @@ def command(run_folder: Path | None, name: str | None, out: Path | None, choices
         say(text.removesuffix("\n"), sys.stdout, as_is=True)
         return 0
     write_text(out, text)
-    say(f"{out}: the {mounting.sensor}'s mount for {target.title}; totals, which replace what stands there", sys.stdout)
+    sensor = SENSOR_WORDS[mounting.sensor]
+    say(f"{out}: the {sensor}'s mount for {target.title}; totals, which replace what stands there", sys.stdout)
     return 0
 
 

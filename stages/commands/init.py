@@ -33,6 +33,7 @@ def command(folder: Path, pool: Path | None, with_pool: bool) -> int:
     _refuse_present(session_path, "take it away to begin anew")
     if with_pool:
         _refuse_present(pool_path, "give --no-pool to keep to it, or name another file with --pool")
+        _refuse_place(pool_path, session_path)
     survey = survey_folder(folder)
     _refuse_nothing(survey)
     texts = {session_path: session_text(survey)} | ({pool_path: pool_text(survey.track)} if with_pool else {})
@@ -56,6 +57,13 @@ def _refuse_folder(folder: Path) -> None:
 def _refuse_present(path: Path, remedy: str) -> None:
     if os.path.lexists(path):
         raise ConfigError(f"{path}: is there already, and poolcal init replaces no file; {remedy}")
+
+
+def _refuse_place(pool: Path, session: Path) -> None:
+    if not pool.parent.is_dir():
+        raise ConfigError(f"--pool {pool}: there is no folder {pool.parent}; make it, or name another file")
+    if pool.resolve() == session.resolve():
+        raise ConfigError(f"--pool {pool}: is where {SESSION_YAML} goes; name another file")
 
 
 def _refuse_nothing(survey: FolderSurvey) -> None:

@@ -27,10 +27,10 @@ def command(run: Path, pdf: Path | None) -> int:
     settings = read_settings(run)
     refuse_output("--pdf", pdf, run, settings.session_folder, begins=b"%PDF")
     calibration(run)
-    if settings.is_session_changed():
+    if settings.is_about_changed():
         again = (
-            f"{settings.session_folder / SESSION_YAML}: has changed since the run: its about, and the digest on the "
-            "certificate, are not those of the page; poolcal run again (it computes only what changed)"
+            f"{settings.session_folder / SESSION_YAML}: about has changed since the run, which the page does not show; "
+            "poolcal run again (it computes only what changed)"
         )
         if pdf is not None:
             raise ArtefactError(f"{again}, then poolcal report")

@@ -66,9 +66,13 @@ def fleet(pool: Pool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Fleet:
 
 
 def _cells(told: Told) -> dict[str, tuple[str, str]]:
-    """Verdict and what was done, by the session's name."""
-    lines = [line.split() for line in told.out.splitlines() if line.startswith("data/") and line.split()[0][-1] != ":"]
-    return {line[0].removeprefix("data/"): (line[1], " ".join(line[line.index("s") + 1 :])) for line in lines}
+    """Verdict in the table, and what the line at the session's end says was done, by the session's name."""
+    table = told.out.split("\n\n")[0].splitlines()[1:]
+    verdicts = {line.split()[0].removeprefix("data/"): line.split()[1] for line in table}
+    ends = [line.partition(": ") for line in told.err.splitlines() if line.endswith(" s)")]
+    done = {label.removeprefix("data/"): words.rpartition(" (")[0].rpartition("; ")[2] for label, _, words in ends}
+    finished = ("accepted", "rejected")
+    return {name: (verdict, done[name] if verdict in finished else "") for name, verdict in verdicts.items()}
 
 
 def test_all_kinds_of_ends_then_a_second_call(fleet: Fleet, toy: Toy) -> None:
@@ -83,10 +87,10 @@ def test_all_kinds_of_ends_then_a_second_call(fleet: Fleet, toy: Toy) -> None:
     assert _cells(told) == {
         "good": ("accepted", "ran take, sift, report"),
         "bad": ("rejected", "ran take, sift, report"),
-        "bug": ("-", "bug"),
-        "crash": ("-", "bug"),
-        "lost": ("-", "refused"),
-        "locked": ("-", "refused"),
+        "bug": ("bug", ""),
+        "crash": ("bug", ""),
+        "lost": ("refused", ""),
+        "locked": ("refused", ""),
         "last": ("accepted", "ran take, sift, report"),
     }
     below = told.out.split("\n\n")[1].splitlines()
@@ -119,7 +123,7 @@ def _second_call(fleet: Fleet, toy: Toy) -> None:
     assert cells["bad"] == ("rejected", "up to date")
     assert cells["bug"] == cells["crash"] == ("accepted", "ran report")
     assert cells["lost"] == cells["locked"] == ("accepted", "ran take, sift, report")
-    assert told.out.splitlines()[-1] == "7 sessions: 6 accepted, 1 rejected."
+    assert told.out.splitlines()[-1] == "7 sessions: 6 accepted, 1 rejected; 3 up to date."
     assert "no history: runs/history: cannot be written" in told.err
     assert {path: path.read_bytes() for path in before} == before
     assert {path.name for path in before} >= {"calibration.json", "means.parquet", "manifest.json"}

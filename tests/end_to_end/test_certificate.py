@@ -236,10 +236,13 @@ def test_names_that_came_after_the_run_are_not_left_out_in_silence(done: Place, 
     done.edit_session("about", client="Port of Qingdao")
     told = poolcal("report", done.run)
     assert told.status == 0
-    assert "session.yaml: has changed since the run" in told.err
+    assert "session.yaml: about has changed since the run" in told.err
     told = poolcal("report", done.run, "--pdf", pdf)
     assert (told.status, len(told.err.splitlines()), pdf.exists()) == (2, 1, False)
     assert "poolcal run again" in told.err
+    done.edit_session("", about=None)
+    done.edit_session("mbes", mount={"x_m": 0.37})  # as poolcal laser writes the mount that it found
+    assert poolcal("report", done.run).err == ""
     (done.session / "session.yaml").unlink()  # the disk with the raw files is elsewhere
     assert poolcal("report", done.run).err == ""
 

@@ -1,6 +1,7 @@
 """poolcal check-entry on a small run: soundings by an independent model of a survey software, right and wrong."""
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -8,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.support.files.gsf_survey import write_gsf
 from tests.support.places import Place, Told, poolcal, result_of
 from tools.survey_software import Entry, Recording, entry_of, georeferenced, in_crs, recording, write_points
 
@@ -64,8 +66,6 @@ def test_a_right_entry_passes(
         ({"angles_deg": (-1, 1, 1)}, "sign_roll"),
         ({"order": "rph"}, "order_roll_pitch_yaw"),
         ({"lever_arm_m": (1, 1, -1)}, "sign_z"),
-        ({"level_lever_arm": True}, "level_lever_arm"),
-        ({"range_factor": 1.003}, "sound_speed"),
     ],
 )
 def test_a_mistake_is_named(
@@ -83,16 +83,92 @@ def test_a_mistake_is_named(
     assert text.out.startswith("Not entered rightly: ")
 
 
+@pytest.mark.parametrize(
+    ("changed", "code", "said"),
+    [
+        ({"level_lever_arm": True}, "level_lever_arm", "the software adds the lever arm without roll and pitch"),
+        ({"range_factor": 1.003}, "sound_speed", "the software's ranges are +0.30 % longer"),
+        ({"shift_m": (0.31, -0.12, 0.0)}, "shift", "all soundings are shifted by +0.310 m east, -0.120 m north"),
+        ({"delay_s": 0.5}, "delay", "the software's poses are +0.5000 s late"),
+    ],
+)
+def test_a_right_entry_with_something_else_wrong(
+    run: Path, recorded: Recording, right: Entry, tmp_path: Path, changed: dict[str, Any], code: str, said: str
+) -> None:
+    file = tmp_path / "a.xyz"
+    write_points(file, in_crs(georeferenced(recorded, replace(right, **changed)), UTM), 3)
+    status, found = asked(run, file)
+    assert (status, found["answer"]) == (1, "right_but")
+    assert [set(one["codes"]) - {"right", "plain"} for one in found["explanations"]] == [{code}]
+    text = poolcal("check-entry", run, file)
+    assert " ".join(text.out.split()).startswith(f"Entered rightly, but {said}")
+
+
+@pytest.mark.parametrize("wrong", [{}, {"lever_arm_m": (0.0, 0.012, 0.0)}, {"angles_deg": (0.04, 0.0, 0.0)}])
+@pytest.mark.parametrize("other", [{"gradient_per_s": -3.0}, {"wander_m": 0.03}, {"steer_factor": 1.003}])
+def test_other_rays_or_positions_prove_nothing_and_accuse_nobody(
+    run: Path, recorded: Recording, right: Entry, tmp_path: Path, wrong: dict[str, Any], other: dict[str, Any]
+) -> None:
+    values = {key: tuple(np.add(getattr(right, key), value)) for key, value in wrong.items()}
+    file = tmp_path / "a.xyz"
+    write_points(file, in_crs(georeferenced(recorded, replace(right, **(other | values))), UTM), 3)
+    status, found = asked(run, file)
+    assert (status, found["answer"]) == (1, "uncertain")
+    text = poolcal("check-entry", run, file).out
+    assert text.startswith("Cannot be told closely enough")
+    assert "mm beyond rounding" in text
+
+
+@pytest.mark.parametrize("kept", ["first pass", "half of each fan", "every third ping", "without a fifth of the beams"])
+def test_parts_of_the_soundings_will_do(
+    run: Path, recorded: Recording, right: Entry, tmp_path: Path, kept: str
+) -> None:
+    t_s = (recorded.t_ns - recorded.t_ns[0]) / 1e9
+    ping = np.unique(recorded.t_ns, return_inverse=True)[1]
+    wanted = {
+        "first pass": t_s < np.where(np.diff(t_s) > 5, t_s[:-1], np.inf).min() + 1,
+        "half of each fan": np.median(recorded.points_m[:, 1]) < recorded.points_m[:, 1],
+        "every third ping": ping % 3 == 0,
+        "without a fifth of the beams": np.random.default_rng(1).random(len(t_s)) > 0.2,
+    }[kept]
+    file, placed = tmp_path / "a.xyz", georeferenced(recorded, right)
+    write_points(file, in_crs(placed[wanted], UTM), 3)
+    assert asked(run, file)[1]["answer"] == "right"
+    (r, p, h) = right.angles_deg
+    write_points(file, in_crs(georeferenced(recorded, replace(right, angles_deg=(r, p, -h)))[wanted], UTM), 3)
+    status, found = asked(run, file)
+    assert (status, found["answer"]) == (1, "wrong")
+    assert found["explanations"][0]["codes"][0] == "sign_yaw"
+
+
 def test_heights_of_another_surface(run: Path, recorded: Recording, right: Entry, tmp_path: Path) -> None:
     file = tmp_path / "a.csv"
     points = in_crs(georeferenced(recorded, right), UTM, lift_m=-8.312)
     write_points(file, points * [1, 1, -1], 3, header="E,N,Depth")
     told = poolcal("check-entry", run, file)
     assert told.status == 0
-    assert "z not judged" in told.out.splitlines()[0]
+    assert "z is known to 0.0" in told.out.splitlines()[1]
     write_points(file, points, 3)
-    assert poolcal("check-entry", run, file).status == 1
+    told = poolcal("check-entry", run, file)
+    assert told.status == 1
+    assert told.out.startswith("Entered rightly, but all heights are -8.3")
     assert poolcal("check-entry", run, file, "--other-heights").status == 0
+
+
+def test_a_gsf_file_names_signs_but_proves_no_hundredth_of_a_degree(
+    run: Path, recorded: Recording, right: Entry, tmp_path: Path
+) -> None:
+    file, water_m = tmp_path / "a.gsf", float(np.median(recorded.ins["height_m"])) - 1.3
+    write_gsf(file, recorded, georeferenced(recorded, right), water_m)
+    status, found = asked(run, file)
+    assert (status, found["answer"]) == (1, "uncertain")
+    assert found["limit_deg"] < 0.2
+    assert "rounds its places to a centimetre" in poolcal("check-entry", run, file).out
+    (r, p, h) = right.angles_deg
+    write_gsf(file, recorded, georeferenced(recorded, replace(right, angles_deg=(-r, p, h))), water_m)
+    status, found = asked(run, file)
+    assert (status, found["answer"]) == (1, "wrong")
+    assert {one["codes"][0] for one in found["explanations"]} == {"sign_roll"}
 
 
 def test_another_zone_is_named_and_swapped_axes_are_read(
@@ -101,8 +177,16 @@ def test_another_zone_is_named_and_swapped_axes_are_read(
     file, placed = tmp_path / "a.xyz", georeferenced(recorded, right)
     write_points(file, in_crs(placed, "EPSG:32650"), 3)
     told = poolcal("check-entry", run, file, "--crs", UTM)
-    assert told.status == 2
+    assert (told.status, told.out, told.err.count("\n")) == (2, "", 1)
     assert "they would in EPSG:32650" in told.err
+    write_points(file, in_crs(placed, "EPSG:4549"), 3)  # CGCS2000, 3-degree zone at 120 E: another scale and false east
+    told = poolcal("check-entry", run, file, "--crs", UTM)
+    assert (told.status, told.out, told.err.count("\n")) == (2, "", 1)
+    assert "EPSG:4549" in told.err
+    write_points(file, np.add(in_crs(placed, UTM), [1000.0, 0.0, 0.0]), 3)
+    told = poolcal("check-entry", run, file, "--crs", UTM)
+    assert told.status == 2
+    assert "m from the target; is it another datum, another CRS, or another session?" in told.err
     write_points(file, in_crs(placed, UTM)[:, [1, 0, 2]], 3)
     status, found = asked(run, file, "--crs", UTM)
     assert status == 0
@@ -137,6 +221,46 @@ def test_a_grid_is_refused(run: Path, recorded: Recording, right: Entry, tmp_pat
     told = poolcal("check-entry", run, file, "--crs", UTM)
     assert told.status == 2
     assert "a grid of 0.25 m" in told.err
+
+
+def test_another_session_is_refused(run: Path, recorded: Recording, right: Entry, tmp_path: Path) -> None:
+    """The same target and mount, but another track and noise of its own."""
+    noise = np.random.default_rng(6).normal(0, 0.01, (len(recorded.t_ns), 1))
+    other = replace(
+        recorded, points_m=recorded.points_m * (1 + noise / np.linalg.norm(recorded.points_m, axis=1)[:, None])
+    )
+    file = tmp_path / "a.xyz"
+    write_points(file, in_crs(georeferenced(other, replace(right, wander_m=0.3)), UTM), 3)
+    told = poolcal("check-entry", run, file)
+    assert (told.status, told.out) == (2, "")
+    assert "is it the same session?" in told.err
+
+
+@pytest.mark.parametrize("ending", ["xyz", "las", "laz", "gsf"])
+def test_a_file_that_was_cut_is_used_as_far_as_it_goes_or_refused_in_one_line(
+    run: Path, recorded: Recording, right: Entry, tmp_path: Path, ending: str
+) -> None:
+    file, placed = tmp_path / f"a.{ending}", georeferenced(recorded, right)
+    if ending == "gsf":
+        write_gsf(file, recorded, placed, float(np.median(recorded.ins["height_m"])) - 1.3)
+    else:
+        write_points(file, in_crs(placed, UTM), 3)
+    content = file.read_bytes()
+    file.write_bytes(content[: len(content) * 6 // 10 + 7])
+    told = poolcal("check-entry", run, file, "--crs", *(["EPSG:4979"] if ending == "gsf" else [UTM]))
+    assert told.status in (0, 1, 2)
+    if told.status == 2:
+        assert (told.out, told.err.count("\n")) == ("", 1)
+    else:
+        assert told.out.startswith(("Entered rightly: within", "Cannot be told closely"))
+
+
+def test_a_run_without_poses_is_refused(undisturbed: tuple[Path, Told], tmp_path: Path) -> None:
+    old = tmp_path / "old"
+    shutil.copytree(undisturbed[0], old)
+    shutil.rmtree(old / "ingest")
+    told = poolcal("check-entry", old, tmp_path / "a.xyz")
+    assert (told.status, told.out, told.err.count("\n")) == (2, "", 1)
 
 
 def test_a_rejected_run_is_refused(done: Place, tmp_path: Path) -> None:

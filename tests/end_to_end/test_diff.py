@@ -32,6 +32,7 @@ def wider(small: Path, undisturbed: tuple[Path, Told], tmp_path_factory: pytest.
     place.mend()
     shutil.copytree(undisturbed[0], place.run)
     place.edit_config("segment", margin_m=0.05)
+    place.edit_session("about", vessel="Haice 7")  # is no setting that a result depends on
     assert place.calibrate().status == 0
     return place
 

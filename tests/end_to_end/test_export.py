@@ -150,7 +150,8 @@ def test_files_that_must_stay(undisturbed: tuple[Path, Told], place: Place) -> N
         (place.folder / "sheet.pdf", "name a file that ends in .txt"),
         (run / "sheet.txt", "lies in the folder"),
         (session / "sheet.txt", "lies in the folder"),
-        (place.folder / "no" / "sheet.txt", "cannot be written"),
+        (place.folder / "no" / "sheet.txt", f"there is no folder {place.folder / 'no'}; make it"),
+        (place.folder / f"{'水' * 99}.txt", "cannot be written (File name too long)"),
     ):
         told = poolcal("export", run, "--to", "qinsy", "--out", file)
         assert (told.status, told.err.count("\n")) == (2, 1)

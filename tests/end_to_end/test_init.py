@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,8 @@ import yaml
 
 from pipeline.config.load import load_pool, load_session
 from pipeline.config.session import SessionConfig
+from pipeline.starting.folder_survey import survey_folder
+from pipeline.starting.session_text import session_text
 from tests.support.marks import marks_of
 from tests.support.places import Told, poolcal, simulate
 from tests.support.refusals import one_line
@@ -100,7 +103,8 @@ def test_the_same_folder_gives_the_same_bytes_and_nothing_is_replaced(bare: Path
 
 
 def test_the_pool_goes_where_it_is_wanted_or_nothing_is_written(bare: Path, tmp_path: Path) -> None:
-    one_line(poolcal("init", bare, "--pool", tmp_path / "no" / "pool.yaml"), "cannot be written")
+    one_line(poolcal("init", bare, "--pool", tmp_path / "no" / "pool.yaml"), "there is no folder", "make it")
+    one_line(poolcal("init", bare, "--pool", bare / "ins" / ".." / "session.yaml"), "is where session.yaml goes")
     assert not (bare / "session.yaml").exists()
     told = poolcal("init", bare, "--pool", tmp_path / "my pool.yaml")
     assert told.status == 0
@@ -186,6 +190,46 @@ def test_an_sbet_without_a_date_gets_the_week_of_the_others(tmp_path: Path) -> N
     assert content["ins"]["gps_week"] == "FILL_IN"
     assert content["laser"]["files"] == "FILL_IN"
     assert "mbes" not in content
+
+
+def test_two_weeks_in_one_folder_are_pointed_out(bare: Path, small: Path, tmp_path: Path) -> None:
+    later = simulate(tmp_path / "later", start_utc="2026-05-19T08:00:00")
+    shutil.copytree(later / "mbes", bare / "mbes" / "一周后")
+    told = poolcal("init", bare)
+    assert told.status == 0, told.err
+    doubt = "mbes/一周后/pass_0.xtf: begins 7 days after the end of mbes/pass_1.xtf; if they are of two sessions"
+    assert f"Look: {doubt}" in told.out
+    text = " ".join((bare / "session.yaml").read_text(encoding="utf-8").replace("# ", "").split())
+    assert f"Look: {doubt}" in text
+    assert "Look: mbes/一周后/pass_0.xtf (and 1 more): runs from 2026-05-19T" in told.out
+
+
+class _Removal:
+    """Removes a file when it is opened for the n-th time, by whatever means."""
+
+    def __init__(self, path: Path, nth: int) -> None:
+        self.path, self.left = path, nth
+
+    def __call__(self, event: str, words: tuple[Any, ...]) -> None:
+        if event == "open" and words[0] == str(self.path):
+            self.left -= 1
+            if self.left == 0:
+                self.path.unlink()
+
+
+@pytest.mark.parametrize("nth", range(1, 10))
+def test_a_file_that_goes_while_it_is_looked_at(nth: int, bare: Path) -> None:
+    """It is used no more and named with the reason, or it was read already."""
+    removal = _Removal(bare / "laser" / "pass_0.las", nth)
+    sys.addaudithook(removal)  # stays, and does nothing more
+    survey = survey_folder(bare)
+    assert not removal.path.exists()
+    listed = {file.name for group in survey.groups["laser"] for file in group.files}
+    left_out = {one.name: one.why for one in survey.left_out}
+    assert ("laser/pass_0.las" in listed) != ("laser/pass_0.las" in left_out)
+    assert "laser/pass_1.las" in listed
+    assert {"No such file or directory" in why or "is there no longer" in why for why in left_out.values()} <= {True}
+    session_text(survey)
 
 
 # --- refusals --------------------------------------------------------------------------------------------------------

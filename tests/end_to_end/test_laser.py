@@ -3,13 +3,17 @@
 import json
 from pathlib import Path
 
+import laspy
 import numpy as np
+import pandas as pd
 import pytest
 import yaml
 
 from pipeline.config.load import load_session
+from pipeline.exports.registry import TARGETS
 from tests.support.pages import Page
 from tests.support.places import Place, Told, poolcal, simulate
+from tests.support.programs import READERS
 from tests.support.recordings import read, text
 
 STAGES = ("ingest", "georeference", "segment", "fit_planes", "adjust", "report")
@@ -75,6 +79,42 @@ def test_the_mount_found_goes_into_the_session_and_from_there_into_the_sonars_to
     laser_alone = np.array(block["covariance_total"])
     for k in (3, 4, 5):  # how much of each angle, tests/stages/test_laser.py asks of whole calibrations
         assert total[k, k] - random[k, k] >= 0.8 * laser_alone[k, k]
+
+
+def test_its_mount_and_points_go_to_other_programs(laser: Place) -> None:
+    """The mount found, not the coarse one of the settings, in every form that takes a laser; and its points alone."""
+    assert calibrate(laser, "--no-write").status == 0
+    block = json.loads((laser.run / "report" / "calibration.json").read_text())["laser"]
+    found = np.reshape(block["R_body_from_laser"], (3, 3)), np.array(block["lever_arm_m"])
+    coarse = mount(laser)
+    assert abs(block["mount"]["roll_deg"] - coarse["roll_deg"]) > 0.01  # else nothing is told apart
+    for name, target in TARGETS.items():
+        file = laser.folder / f"激光 {name}{target.suffix}"
+        told = poolcal("export", laser.run, "--to", name, "--out", file)
+        if target.sensor == "mbes":
+            assert (told.status, file.exists()) == (2, False)
+            assert "calibrates the laser alone, and holds no sonar" in told.err
+            continue
+        assert told.status == 0, told.err
+        assert f"{file}: the laser's mount for {target.title}" in told.out
+        if name in ("json", "yaml", "csv"):
+            assert "R_body_from_laser" in file.read_text("utf-8")
+        R, position = READERS[name](file.read_text("utf-8"), "YPR")
+        np.testing.assert_allclose(R, found[0], atol=3e-6)
+        np.testing.assert_allclose(position, found[1], atol=6e-5)
+        told = poolcal("mount", file, "--from", name, "--session", laser.session, "--sensor", "laser")
+        assert told.status == 0, told.err
+        for key, value in mount(laser).items():
+            assert value == pytest.approx(block["mount"][key], abs=6e-5), (name, key)
+    for suffix in ("las", "laz"):
+        file = laser.folder / f"cloud.{suffix}"
+        assert poolcal("export", laser.run, "--to", suffix, "--out", file).status == 0
+        cloud = laspy.read(file)
+        rows = pd.read_parquet(laser.run / "adjust" / "residuals.parquet")
+        assert len(cloud.points) >= len(rows) > 1000
+        assert set(np.unique(cloud.user_data)) == {1}
+        rms = float(np.sqrt(np.mean(np.square(cloud["residual_mm"]))))
+        assert rms == pytest.approx(1e3 * float(np.sqrt(np.mean(np.square(rows["residual_m"])))), abs=0.2)
 
 
 def test_nothing_is_written_where_it_is_only_looked_at_or_rejected(laser: Place) -> None:

@@ -45,12 +45,13 @@ def test_as_single_runs_then_nothing_to_do(place: Path, right: dict[str, str]) -
         run = place / "runs" / "甲" / name
         assert digests(run) == right
         mount = result_of(run)["mbes"]["mount"]
-        assert rows[f"data/{name}"][1:8] == ["accepted", *(f"{mount[key]:.4f}" for key in SETTINGS)]
-        assert rows[f"data/{name}"][-4:] == ["ran", "ingest", "to", "report"]
+        values = [f"{mount[key]:.{4 if key.endswith('_deg') else 3}f}" for key in SETTINGS]
+        assert rows[f"data/{name}"][1:8] == ["accepted", *values]
+        assert f"data/{name}: accepted; ran ingest to report (" in told.err
     assert rows["data/01"][8] == "-"
     assert " ".join(rows["data/02"][8:10]) == "too uncertain"  # two passes, without a cast: as poolcal diff says
     assert rows["data/拒"][1:9] == ["rejected", *"-------"]
-    assert rows["data/lost"][-1] == "refused"
+    assert rows["data/lost"][1:9] == ["refused", *"-------"]
     assert "data/lost: refused: session.yaml: ins.files: 'ins/" in told.out
     history = {group: pd.read_parquet(place / "runs" / group / "history" / "history.parquet") for group in ("甲", "b")}
     assert history["甲"]["run"].tolist() == ["01", "02"]
@@ -59,6 +60,7 @@ def test_as_single_runs_then_nothing_to_do(place: Path, right: dict[str, str]) -
     before = json.loads((place / "runs" / "甲" / "01" / "report" / "manifest.json").read_text())
     again = _repeat()
     assert again.status == 2
-    assert again.out.count("up to date") == 3
+    assert again.err.count("; up to date (") == 3
+    assert "1 could not run; 3 up to date." in again.out
     assert again.out.count("too uncertain") == 1
     assert json.loads((place / "runs" / "甲" / "01" / "report" / "manifest.json").read_text()) == before

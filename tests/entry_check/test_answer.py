@@ -11,7 +11,7 @@ from pipeline.entry_check.run_soundings import EntrySource
 from pipeline.mount import Mounted
 from tests.support.entered import ANGLES, COARSE, COARSE_LEVER, LEVER, SOURCE, Boat, rotation
 
-BOAT = Boat()
+BOAT = Boat((0.0, 0.0, 0.0, 0.0))  # four passes
 RIGHT_R = rotation(ANGLES)
 
 
@@ -19,7 +19,8 @@ def answer(
     points: np.ndarray, source: EntrySource = SOURCE, heights_differ: bool = False, noise_m: float = 3e-4
 ) -> Answer:
     points = points + np.random.default_rng(5).normal(0, noise_m, points.shape)
-    return answer_of(Pairs(BOAT.soundings, points, len(points), 1.0, 0.0, False, "order"), source, heights_differ)
+    pairs = Pairs(BOAT.soundings, points, len(points), 1.0, 0.0, False, "order")
+    return answer_of(pairs, source, heights_differ, 0.0005)
 
 
 def codes(found: Answer) -> set[frozenset[str]]:
@@ -51,8 +52,7 @@ def test_both_sides_of_the_tolerance(angle_deg: float, lever_m: float, is_right:
 def test_the_mistake_is_named(R: np.ndarray, lever: np.ndarray, expected: set[str]) -> None:
     found = answer(BOAT.placed(R, lever))
     assert codes(found) == {frozenset(expected)}
-    assert found.certain
-    assert not found.is_right
+    assert found.verdict == "wrong"
 
 
 def test_two_mistakes_with_the_same_numbers_are_both_named() -> None:
@@ -62,25 +62,75 @@ def test_two_mistakes_with_the_same_numbers_are_both_named() -> None:
     assert codes(found) == {frozenset({"minus"}), frozenset({"sign_yaw"})}
 
 
-def test_an_unknown_point_is_no_mistake_of_the_catalogue() -> None:
+def test_an_unknown_point_is_told_from_a_shift_of_all_positions() -> None:
     found = answer(BOAT.placed(RIGHT_R, LEVER + np.array([0.41, -0.33, 0.27])))
-    assert found.explanations == ()
+    assert (found.verdict, codes(found)) == ("wrong", {frozenset({"other_point"})})
     assert found.rotation_right
     assert found.lever_m == pytest.approx([0.41, -0.33, 0.27], abs=0.001)
+    found = answer(BOAT.placed(RIGHT_R, LEVER) + np.array([0.41, -0.33, 0.27]))
+    assert (found.verdict, codes(found)) == ("right_but", {frozenset({"shift"})})
+
+
+def test_a_shift_is_told_in_east_and_north() -> None:
+    """The pool's y axis points to 163 degrees: its x axis to 253, west-south-west."""
+    turned = replace(SOURCE, azimuth_rad=np.radians(163.0))
+    found = answer(BOAT.placed(RIGHT_R, LEVER) + np.array([1.0, 0.0, 0.0]), turned)
+    east, north = np.sin(np.radians(253.0)), np.cos(np.radians(253.0))
+    assert f"shifted by {east:+.3f} m east, {north:+.3f} m north" in found.explanations[0].words[0]
+
+
+def test_what_rounding_hides_is_undecidable() -> None:
+    """A shift by 2 cm spreads by less than rounding if it is taken for a lever arm."""
+    found = answer(BOAT.placed(RIGHT_R, LEVER) + np.array([0.02, 0.0, 0.0]), noise_m=0.003)
+    assert found.verdict in ("undecidable", "uncertain")
+    assert any(one.mount_is_right for one in found.explanations)
 
 
 @pytest.mark.parametrize(("delay_s", "code"), [(0.02, "sonar_latency_missing"), (0.04, "sonar_latency_sign")])
 def test_latency(delay_s: float, code: str) -> None:
-    assert codes(answer(BOAT.placed(RIGHT_R, LEVER, delay_s))) == {frozenset({code})}
+    found = answer(BOAT.placed(RIGHT_R, LEVER, delay_s))
+    assert (found.verdict, codes(found)) == ("right_but", {frozenset({code})})
+
+
+@pytest.mark.parametrize("delay_s", [0.13, -0.08])
+def test_another_time_base(delay_s: float) -> None:
+    found = answer(BOAT.placed(RIGHT_R, LEVER, delay_s))
+    assert (found.verdict, codes(found)) == ("right_but", {frozenset({"delay"})})
+    assert found.way.fitted.delay_s == pytest.approx(delay_s, abs=0.001)
 
 
 @pytest.mark.parametrize("heights_differ", [False, True])
 def test_other_heights(heights_differ: bool) -> None:
     found = answer(BOAT.placed(RIGHT_R, LEVER) + np.array([0, 0, -8.3]), heights_differ=heights_differ)
-    assert found.is_right == heights_differ
+    assert found.verdict == ("right" if heights_differ else "right_but")
     assert codes(found) == ({frozenset()} if heights_differ else {frozenset({"heights"})})
-    assert found.way.judged == (True, True, False)
+    assert found.way.any_height
+
+
+@pytest.mark.parametrize("heights_differ", [False, True])
+def test_a_wrong_z_is_found_below_any_heights(heights_differ: bool) -> None:
+    """Roll and pitch move the soundings level by z: 4 m are no height reference."""
+    lifted = BOAT.placed(RIGHT_R, LEVER * [1, 1, -1]) + np.array([0, 0, -8.3])
+    found = answer(lifted, heights_differ=heights_differ)
+    assert found.verdict == "wrong"
+    assert codes(found) == {frozenset({"sign_z"} if heights_differ else {"sign_z", "heights"})}
+
+
+def test_an_angle_may_be_the_attitudes_but_a_large_one_turns_the_lever_arm_too() -> None:
+    turned = rotation({"roll": 0.0, "pitch": 0.0, "yaw": 2.0})
+    found = answer(BOAT.placed(turned @ RIGHT_R, turned @ LEVER))
+    assert (found.verdict, codes(found)) == ("right_but", {frozenset({"attitudes"})})
+    found = answer(BOAT.placed(rotation(ANGLES | {"yaw": -1.6}), LEVER))
+    assert (found.verdict, codes(found)) == ("undecidable", {frozenset({"attitudes"}), frozenset({"unknown_angles"})})
+
+
+@pytest.mark.parametrize(("R", "expected"), [(RIGHT_R, "uncertain"), (rotation(ANGLES | {"roll": 48.8}), "wrong")])
+def test_other_positions_in_each_pass_hide_a_centimetre_but_no_sign(R: np.ndarray, expected: str) -> None:
+    moved = np.repeat(np.random.default_rng(4).normal(0, 0.02, (4, 3)), len(BOAT.x_mbes) // 4, axis=0)
+    found = answer(BOAT.placed(R, LEVER + np.array([0.01, 0.0, 0.0])) + moved)
+    assert found.verdict == expected
+    assert found.excess_m == pytest.approx(0.02, abs=0.01)
 
 
 def test_too_few_or_too_rough_soundings_cannot_tell() -> None:
-    assert not answer(BOAT.placed(RIGHT_R, LEVER), noise_m=1.0).certain
+    assert answer(BOAT.placed(RIGHT_R, LEVER), noise_m=1.0).verdict == "uncertain"

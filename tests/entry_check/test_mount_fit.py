@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pipeline.entry_check.mount_fit import FREE_ALL, FREE_MOUNT, fit_mount
+from pipeline.entry_check.mount_fit import FREE_ALL, fit_mount, freed
 from tests.support.entered import ANGLES, LEVER, Boat, rotation
 
 WRONG = [
@@ -43,7 +43,7 @@ def test_errors_are_as_the_covariance_says_and_outliers_do_not_count() -> None:
 
 def test_two_courses_tell_a_shift_from_the_lever_arm_and_one_course_leaves_it_uncertain() -> None:
     R, shift = rotation(ANGLES), np.array([0.5, -0.3, 0.0])
-    free = (*FREE_MOUNT[:6], True, True, False, False)
+    free = freed("shift_x", "shift_y")
     sigma = {}
     for headings in ((0.0, 180.0), (0.0,)):
         boat = Boat(headings)

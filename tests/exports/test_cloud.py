@@ -1,5 +1,6 @@
 """The calibrated points as LAS and LAZ: places and distances by a model of their own, marks, and memory."""
 
+import resource
 import tracemalloc
 from pathlib import Path
 
@@ -151,6 +152,25 @@ def test_memory_does_not_grow_with_the_points(tmp_path: Path) -> None:
         tracemalloc.stop()
     assert peaks[1] < 1.1 * peaks[0]
     assert peaks[1] < 150e6
+
+
+@pytest.mark.parametrize("missing", [1, 20_000, -100])  # room for all but a byte; for a part; for 100 bytes alone
+@pytest.mark.parametrize("suffix", ["las", "laz"])
+def test_a_disk_without_room_is_one_line_and_leaves_no_file(suffix: str, missing: int, tmp_path: Path) -> None:
+    """The system's limit of a file's size stands for a full disk."""
+    points, _ = made_up(tmp_path / "run", 4000)
+    path = tmp_path / f"cloud.{suffix}"
+    write_cloud(path, points, POOL, ORIGIN)
+    room = path.stat().st_size - missing if missing > 0 else -missing
+    path.unlink()
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (room, hard))
+    try:
+        with pytest.raises(ArtefactError, match=rf"cloud\.{suffix}: cannot be written \(File too large\)"):
+            write_cloud(path, points, POOL, ORIGIN)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert [left.name for left in tmp_path.iterdir()] == ["run"]
 
 
 def test_a_stream_that_ends_early_leaves_no_file(tmp_path: Path) -> None:

@@ -175,3 +175,19 @@ def test_programs_that_count_from_the_ins_take_no_other_frame(name: str) -> None
 def test_options_that_cannot_be_are_refused(name: str, options: Options, said: str) -> None:
     with pytest.raises(ConfigError, match=said):
         export_text(TARGETS[name], mounting(BODY), options)
+
+
+def test_qimeras_sheet_tells_the_transmitters_place_or_that_it_is_not_known() -> None:
+    """Rz(yaw) of a level head: an offset forward goes to port for a bow to port."""
+    level = mounted(0.0, 0.0, 30.0, 0.1, 0.2, -1.0)
+    sheet = export_text(TARGETS["qimera"], mounting(level, projector_offset_m=(0.0, 0.2, 0.0)), Options())
+    x, y = 0.1 - 0.2 * np.sin(np.radians(30.0)), 0.2 + 0.2 * np.cos(np.radians(30.0))
+    assert f"Transmitter, m: X {x:.4f}, Y {y:.4f}, Z -1.0000." in sheet
+    assert "--projector-offset" in export_text(TARGETS["qimera"], mounting(level), Options())
+
+
+@pytest.mark.parametrize("name", sorted(set(TARGETS) - {"kluster"}))
+def test_a_form_tells_which_run_it_is_of(name: str) -> None:
+    words = " ".join(text_of(name, origin=replace(ORIGIN, digest="ab" * 32)).split())
+    assert f"Verdict: accepted. First pass: {ORIGIN.start_utc}." in words
+    assert f"SHA-256 of calibration.json: {'ab' * 32}" in words

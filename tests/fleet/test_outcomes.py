@@ -20,6 +20,7 @@ from pipeline.fleet.answer import (
 from pipeline.fleet.logs import log_of, write_log
 from pipeline.fleet.session_list import FleetSession
 from pipeline.fleet.table import Outcome, count_line, outcome_table
+from pipeline.language.letters import width
 
 MOUNT = {"roll_deg": -48.81, "pitch_deg": 1.2, "yaw_deg": -2.0, "x_m": 0.3, "y_m": 0.2, "z_m": -2.01}
 
@@ -94,22 +95,42 @@ def test_the_table_shows_what_may_be_used_and_below_it_why_not(outcomes: list[Ou
     here = Path.cwd()
     moved = {here / "runs" / "good": "moved: roll, yaw", here / "runs" / "lost": "no movement shown"}
     lines = outcome_table(outcomes, moved)
-    cells = [re.split("  +", line) for line in lines]
+    cells = [re.split(r"  +|(?<=\S) (?=[-\d])|(?<=data/good) |(?<=data/part) ", line) for line in lines]
     assert lines[0].index("roll, °") + len("roll, °") == lines[1].index("-48.8100") + len("-48.8100")
-    good = ["-48.8100", "1.2000", "-2.0000", "0.3000", "0.2000", "-2.0100"]
+    good = ["-48.8100", "1.2000", "-2.0000", "0.300", "0.200", "-2.010"]
     assert cells[1:6] == [
-        ["data/good", "accepted", *good, "moved: roll, yaw", "1.2 s", "up to date"],
-        ["data/part", "accepted in part", "-0.0000", *"-----", "-", "1.2 s", "ran adjust, report"],
-        ["data/bad", "rejected", *"------", "-", "1.2 s", "ran ingest to fit_planes; report.html not drawn"],
-        ["data/lost", "-", *"------", "-", "1.2 s", "refused"],
-        ["data/broken", "-", *"------", "-", "1.2 s", "bug"],
+        ["data/good", "accepted", *good, "moved: roll, yaw"],
+        ["data/part", "in part", "-0.0000", *"-----", "-"],
+        ["data/bad", "rejected", *"------", "-"],
+        ["data/lost", "refused", *"------", "-"],
+        ["data/broken", "bug", *"------", "-"],
     ]
     assert lines[6:] == [
         "",
+        "data/good: has moved since the session before: roll, yaw",
         "data/bad: rejected: roll is weak",
+        "data/bad: report.html not drawn",
         "data/lost: refused: ins/0.gps: cannot be read; copy it again",
         "data/broken: bug: ZeroDivisionError: a; see runs/broken.repeat.log",
     ]
+
+
+@pytest.mark.parametrize(("since", "shown"), [("no movement shown", "no movement shown"),
+                                              ("moved: pitch, roll, yaw, x", "moved")])  # fmt: skip
+@pytest.mark.parametrize("name", ["a" * 60 + "2026-05-12", "水池" * 20 + "2026-05-12"])
+def test_the_table_is_a_hundred_columns_wide_at_most(
+    name: str, since: str, shown: str, outcomes: list[Outcome]
+) -> None:
+    """With long names of sessions, of letters that take two columns too, and the widest values."""
+    here = Path.cwd()
+    mount = {"roll_deg": -179.9999, "pitch_deg": -80.0, "yaw_deg": -179.9999, "x_m": -12.345, "y_m": -12.345, "z_m": -9}
+    session = FleetSession(here / "data" / name, here / "p.yaml", here / "runs" / "a", "mbes", 0)
+    answer = Answer(ACCEPTED, [], verdict="accepted", mount=mount)
+    table = outcome_table([Outcome(session, answer, 1.0), outcomes[1]], {here / "runs" / "a": since})[:3]
+    assert max(map(width, table)) <= 100
+    assert table[1].startswith("…")
+    assert "2026-05-12 accepted" in " ".join(table[1].split())
+    assert table[1].endswith(f" {shown}")
 
 
 def test_lines_at_the_end_of_a_session_and_of_all(outcomes: list[Outcome]) -> None:
@@ -120,8 +141,9 @@ def test_lines_at_the_end_of_a_session_and_of_all(outcomes: list[Outcome]) -> No
         "data/lost: refused: ins/0.gps: cannot be read; copy it again (1.2 s)",
         "data/broken: bug: ZeroDivisionError: a; see runs/broken.repeat.log (1.2 s)",
     ]
-    assert count_line(outcomes) == "5 sessions: 2 accepted, 1 rejected, 1 could not run, 1 ended by a bug."
-    assert count_line(outcomes[:1]) == "1 session: 1 accepted."
+    counts = "2 accepted, 1 rejected, 1 could not run, 1 ended by a bug; 1 up to date"
+    assert count_line(outcomes) == f"5 sessions: {counts}."
+    assert count_line(outcomes[:1]) == "1 session: 1 accepted; 1 up to date."
 
 
 def test_a_log_replaces_nothing_but_a_log(tmp_path: Path) -> None:

@@ -16,8 +16,10 @@ from pipeline.maths.mount_parameters import SETTINGS
 from pipeline.readers.session_files import files_matching
 from pipeline.starting.assumed import about, assumed
 from pipeline.starting.file_patterns import patterns_for
+from pipeline.starting.folder_files import LeftOut
+from pipeline.starting.left_out_words import left_out_lines
 from pipeline.starting.pool_text import pool_text
-from pipeline.starting.yaml_words import capped, comment, file_list, scalar
+from pipeline.starting.yaml_words import comment, file_list, scalar
 
 NAMES = [
     "ins/a.gps", "ins/b c.gps", "水池/第一次.gps", "it's/\"x\".gps", "a,b/[1].gps", "*/?.gps", "x: y.gps", "# x.gps",
@@ -59,9 +61,26 @@ def test_a_comment_never_becomes_a_key(text: str) -> None:
     assert yaml.safe_load("\n".join(lines)) is None
 
 
-def test_long_lists_say_how_much_is_left_out() -> None:
-    assert capped(["a", "b"], 2, "file") == ["a", "b"]
-    assert capped(["a", "b", "c"], 2, "file") == ["a", "b", "and 1 file more"]
+def test_files_alike_are_one_line_and_long_lists_say_how_much_is_left_out() -> None:
+    """The one file among ten thousand pictures that should have been read is seen."""
+    pictures = [LeftOut(f"照片/{number}.jpg", "is no raw data") for number in range(9999)]
+    cut = LeftOut("照片/pass_0.las", "is cut off")
+    assert left_out_lines([*pictures, cut], 2) == [
+        "照片/0.jpg and 9998 files more of its folder and suffix: is no raw data",
+        "照片/pass_0.las: is cut off",
+    ]
+    assert left_out_lines([cut, *pictures], 1)[1:] == ["and 1 file more"]
+    few = [LeftOut(name, "is empty") for name in ("a/2.las", "a/1.las", "a/3.las", "4", "5", "6", "7")]
+    others = [LeftOut("a/0.las", "is cut off"), LeftOut("b/1.las", "is empty")]
+    assert left_out_lines([*few, *others], 9) == [
+        "4 and 3 files more of its folder and suffix: is empty",
+        "a/0.las: is cut off",
+        "a/1.las: is empty",
+        "a/2.las: is empty",
+        "a/3.las: is empty",
+        "b/1.las: is empty",
+    ]
+    assert left_out_lines([*few, *others], 2)[2] == "and 4 files more"
 
 
 def test_a_pools_config_without_a_track() -> None:

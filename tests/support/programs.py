@@ -107,10 +107,19 @@ def caris_hvf(text: str, order: str) -> Read:
     return sfu_rotation(order, roll, pitch, -yaw), np.array([x, y, -z])
 
 
+def as_typed_in(text: str, names: tuple[str, ...], numbers: tuple[float, ...]) -> None:
+    """The fields that a person types in are the numbers of the line, to the four decimals that they show."""
+    typed = fields(text)
+    assert set(typed) == set(names)
+    np.testing.assert_allclose([typed[name] for name in names], numbers, atol=0.0000501)
+
+
 def hypack(text: str, order: str) -> Read:
     """n1 … n7 as mbsys_hysweep.h of MB-System names them; vertical is down from the waterline."""
     (line,) = re.findall(r"^OF2 1 3 (.*)$", text, re.MULTILINE)
     starboard, forward, vertical, yaw, port_up, bow_up, _ = map(float, line.split())
+    names = ("Starboard", "Forward", "Vertical", "Yaw", "Roll", "Pitch")
+    as_typed_in(text, names, (starboard, forward, vertical, yaw, port_up, bow_up))
     R = sfu_rotation(order, port_up, bow_up, -yaw)
     return R, np.array([starboard, forward, -vertical])
 
@@ -130,17 +139,26 @@ def kongsberg(text: str, _: str) -> Read:
     of = dict(part.split("=") for part in group.split(";"))
     flat = dict(re.findall(r"S2([XYZRPH])=([^,]*),", text))
     assert flat == {key: of[key] for key in "XYZRPH"}
-    assert 0 <= float(of["H"]) <= 360
-    return by_frd(*(float(of[key]) for key in "XYZRPH"))
+    numbers = tuple(float(of[key]) for key in "XYZRPH")
+    names = ("Forward (X)", "Starboard (Y)", "Downward (Z)", "Roll (R)", "Pitch (P)", "Heading (H)")
+    as_typed_in(text, names, numbers)
+    assert 0 <= numbers[5] < 360
+    return by_frd(*numbers)
+
+
+def platform_offset(text: str, sensor: int, place: int) -> Read:
+    """One offset of a platform file: starboard, forward, up; heading, roll, pitch."""
+    lines = [line.split("##")[0].split() for line in text.splitlines()]
+    words = [str(sensor), str(place)]
+    (position,) = [line[3:] for line in lines if line[:3] == ["OFFSET_POSITION", *words]]
+    (attitude,) = [line[3:] for line in lines if line[:3] == ["OFFSET_ATTITUDE", *words]]
+    heading, roll, pitch = map(float, attitude)
+    R, _zero = from_frd(frd(roll, pitch, heading), np.zeros(3))
+    return R, np.array(position, dtype=float)
 
 
 def mbsystem(text: str, _: str) -> Read:
-    lines = [line.split("##")[0].split() for line in text.splitlines()]
-    position = [words[3:] for words in lines if words[:3] == ["OFFSET_POSITION", "1", "1"]]
-    attitude = [words[3:] for words in lines if words[:3] == ["OFFSET_ATTITUDE", "1", "1"]]
-    heading, roll, pitch = map(float, attitude[0])
-    R, _zero = from_frd(frd(roll, pitch, heading), np.zeros(3))
-    return R, np.array(position[0], dtype=float)  # starboard, forward, up
+    return platform_offset(text, 1, 1)
 
 
 def novatel(text: str, _: str) -> Read:
@@ -161,7 +179,15 @@ def ros(text: str, _: str) -> Read:
     left = -STARBOARD
     about_x, about_y, about_z = moving(left, UP, roll), moving(UP, FORWARD, pitch), moving(FORWARD, left, yaw)
     forward, to_left, up = (float(word) for word in origin.get("xyz", "").split())
-    return about_z @ about_y @ about_x, np.array([-to_left, forward, up])
+    R = about_z @ about_y @ about_x
+    found = re.search(r"translation (\S+ \S+ \S+), quaternion x y z w (\S+ \S+ \S+ \S+)\.$", text, re.MULTILINE)
+    assert found is not None
+    assert found[1] == origin.get("xyz")
+    x, y, z, w = map(float, found[2].split())
+    of_static_transform = by_quaternion(w, x, y, z)  # on forward, left, up
+    from_flu = np.column_stack([FORWARD, left, UP])
+    np.testing.assert_allclose(from_flu @ of_static_transform @ from_flu.T, R, atol=1e-11)
+    return R, np.array([-to_left, forward, up])
 
 
 def pdal(text: str, _: str) -> Read:
@@ -181,8 +207,10 @@ def mbes_lib(text: str, _: str) -> Read:
 
 
 def xsf(text: str, _: str) -> Read:
+    """byte enum transducer_type_t {receive_only = 0, transmit_only = 1, monostatic = 3} (X1)."""
     platform = json.loads(text)["Platform"]
-    place = platform["transducer_function"].index(1)
+    assert sorted(platform["transducer_function"]) == [0, 1]
+    place = platform["transducer_function"].index(0)
     names = (*(f"transducer_offset_{axis}" for axis in "xyz"), *(f"transducer_rotation_{axis}" for axis in "xyz"))
     return by_frd(*(platform[name][place] for name in names))
 

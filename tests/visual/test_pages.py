@@ -11,13 +11,15 @@ from typing import Any
 
 import pytest
 
-from pipeline.results.pages.rendering import SMALLEST_PT
+from pipeline.results.pages.rendering import SMALLEST_PT, WIDTH_IN
 from tests.support.pages import Page
 from tests.support.places import poolcal
 from tools.pictures import chromium
 
 WIDTHS = (390, 1280)
 LEGIBLE_PX = 9
+A4_PT = 210 / 25.4 * 72  # its width
+PRINT_IN = (210 - 2 * 14) / 25.4  # its width within the margins
 MEASURE = """<!doctype html><meta charset="utf-8"><pre id="out"></pre>
 <iframe id="page" src="PAGE" style="width: 1280px; height: 900px; border: 0"></iframe>
 <script>
@@ -125,10 +127,23 @@ def test_on_paper_nothing_is_cut(page: Path, tmp_path: Path) -> None:
         for row in table:
             for cell in row:
                 letters = "".join(cell.split())  # of a long one, broken into lines, the order is lost
-                lines = all(word in whole for word in cell.split()) if len(cell) < 40 else False
+                pieces = re.split(r"\s+|(?<=[_-])", cell)  # a line may end after _ and -
+                lines = len(cell) < 40 and all(piece in whole for piece in pieces)
                 assert letters in whole or lines or (len(cell) >= 40 and not Counter(letters) - Counter(whole)), cell
-            short = [word for cell in row if cell.strip() and len(cell) < 40 for word in cell.split()]
+            short = [word for cell in row if len(cell) < 40 for word in re.split(r"\s+|(?<=[_-])", cell)]
             assert any(all(cell in sheet for cell in short) for sheet in sheets), row
+
+
+def test_on_paper_no_letter_is_small(page: Path, tmp_path: Path) -> None:
+    """The browser shrinks a sheet on which something is too wide; the sizes are those after that."""
+    pdf = tmp_path / "page.pdf"
+    chromium("--no-pdf-header-footer", f"--print-to-pdf={pdf}", page.as_uri())
+    command = ["pdftohtml", "-xml", "-i", "-stdout", "-zoom", "3", pdf]
+    text = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    across = float(re.findall(r'<page [^>]* width="(\d+)"', text)[0])
+    sizes = [float(size) / across * A4_PT for size in re.findall(r'<fontspec id="\d+" size="(\d+)"', text)]
+    assert min(sizes) >= SMALLEST_PT - 0.2, sizes  # they are told to a third of a point
+    assert SMALLEST_PT * PRINT_IN / WIDTH_IN >= SMALLEST_PT - 0.1  # of letters in pictures
 
 
 def test_ink_on_the_report(run: Path, tmp_path: Path) -> None:

@@ -7,14 +7,15 @@ angles of SVP and of Transducer 1.
 
 from pipeline.exports.convention import SFD, Convention
 from pipeline.exports.sheet import Sheet
-from pipeline.exports.target import Target
 
 CONVENTION = Convention(
     SFD,
     (1, 1, -1),
     None,
     "official",
-    "CARIS help, CreateVesselFile (Transducer, SVP) and Vessel Editor (axes; Δ values are added; Error is subtracted)",
+    "CARIS help, CreateVesselFile (Transducer, SVP) and Vessel Editor (axes; Δ values are added; Error is subtracted; "
+    "names and 1 sigma of TPU Values); NOAA Field Procedures Manual 4.2.3.8 (the sigmas of a patch test belong in the "
+    "MRU's alignment)",
 )
 _SHEET = Sheet(
     groups=(
@@ -35,18 +36,11 @@ _SHEET = Sheet(
         "SVP's angles serve HIPS's own sound velocity correction, for large mounting angles. How HIPS puts the angles "
         "of SVP "
         "and Swath together is not documented in what was found: check a line of known depth.",
-        "TPU, standard deviations (1 sigma): MRU Align. StdDev gyro: sigma of Yaw; MRU Align. StdDev roll/pitch: the "
-        "larger "
-        "one of Roll and Pitch; offsets X, Y, Z of the transducer: sigma of X, Y, Z.",
+        "Newer editors have, in place of Transducer 1, the bathymetry sensor's unit XYZ, or Transmitter and Receiver: "
+        "the same angles in both.",
+        "TPU Values, 1 sigma: MRU Align StdDev Gyro: sigma of Yaw; MRU Align StdDev Roll/Pitch: the larger one of Roll "
+        "and Pitch; Offset X, Offset Y, Offset Z (Other Standard Deviations): sigma of X, Y, Z. Trans Roll (Sensor "
+        "Offsets) is the Roll above; MRU to Trans and Navigation To Trans count from the MRU and from the antenna.",
     ),
 )
-TARGET = Target(
-    name="caris",
-    title="CARIS HIPS vessel editor",
-    writes="entry sheet",
-    suffix=".txt",
-    convention=CONVENTION,
-    write=_SHEET.write,
-    read=_SHEET.read,
-    sensor="mbes",
-)
+TARGET = _SHEET.target("caris", "CARIS HIPS vessel editor", CONVENTION)

@@ -43,6 +43,8 @@ def _write(target: Target, mounting: Mounting, options: Options) -> str:
         "zeros. How "
         "HIPS puts the two together is not documented in what was found: check a line of known depth.",
         "Latency is written as zero: its sign in HIPS was not found.",
+        "Elements and attributes are those of a real vessel file (Version 2.0) in the public repository "
+        "pktrigg/pyAll2VesselConfig; the maker's own description of the XML was not found.",
         *explanation(target, mounting, options, "Must be zero: the 'Error' of the sensors Gyro, Pitch and Roll."),
     ]
     time = quoteattr(_time_stamp(mounting.origin.start_utc))

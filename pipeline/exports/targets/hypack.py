@@ -76,22 +76,19 @@ _SHEET = Sheet(
     extra=_extra,
     not_known={"z": _height_in_words},
 )
-TARGET = Target(
-    name="hypack",
-    title="HYPACK HYSWEEP",
+CONVENTION = Convention(
+    SFD,
+    (1, 1, -1),
+    None,
+    "secondary",
+    "the maker's words as quoted in MB-System, src/mbio/mbsys_hysweep.h, and by USGS Open-File Report 2000-005 (OFF)",
+)
+TARGET = _SHEET.target(
+    "hypack",
+    "HYPACK HYSWEEP",
+    CONVENTION,
     writes="entry sheet, HSX line OF2",
-    suffix=".txt",
-    convention=Convention(
-        SFD,
-        (1, 1, -1),
-        None,
-        "secondary",
-        "the maker's words as quoted in MB-System, src/mbio/mbsys_hysweep.h, and by USGS Open-File Report 2000-005 "
-        "(OFF)",
-    ),
-    write=_SHEET.write,
     read=_read,
-    sensor="mbes",
     counts_from="water",
     uses=frozenset({"ins_height"}),
 )

@@ -4,7 +4,8 @@ The vessel's axes are forward, starboard, down; an array is turned by Rz(H) · R
 comma, their parameters with a semicolon; .all has S1X=…, the transmitter first, the receiver second.
 
 A transmitter that is mounted looking aft stands in SIS with a heading near 180°. With R_tx = R · Rz(180°), and because
-Ry(p) Rx(r) Rz(180°) = Rz(180°) Ry(-p) Rx(-r), its numbers are then -R, -P, H + 180°.
+Ry(p) Rx(r) Rz(180°) = Rz(180°) Ry(-p) Rx(-r), its numbers are then -R, -P, H + 180°. (So has it a file of an EM 2042:
+transmitter 0.017, 0.430, 178.080 beside receiver -0.017, -0.430, 358.080.)
 """
 
 import re
@@ -12,7 +13,7 @@ import re
 from pipeline.errors import ConfigError
 from pipeline.exports.convention import FRD, Convention
 from pipeline.exports.mounting import Mounting
-from pipeline.exports.reading import number, numbers_of, one, written
+from pipeline.exports.reading import number, numbers_of, one, written_for
 from pipeline.exports.sheet import Sheet
 from pipeline.exports.target import Options, Target
 from pipeline.mount import Mounted
@@ -28,7 +29,9 @@ def _extra(target: Target, mounting: Mounting, options: Options) -> list[str]:
     groups, flat = [], []
     for place, (name, mounted) in enumerate(zip(("TX", "RX"), mounting.arrays(), strict=True), start=1):
         values = target.convention.numbers(mounted).by_role()
-        parts = {letter: written(values[role], DECIMALS) for role, letter in LETTERS.items()}
+        parts = {
+            letter: written_for(target.convention, role, values[role], DECIMALS) for role, letter in LETTERS.items()
+        }
         groups.append(
             f"TRAI_{name}1:N={place};" + ";".join(f"{letter}={value}" for letter, value in parts.items()) + ","
         )
@@ -91,22 +94,13 @@ _SHEET = Sheet(
     extra=_extra,
     of=_receiver,
 )  # fmt: skip
-TARGET = Target(
-    name="kongsberg",
-    title="Kongsberg SIS",
-    writes="entry sheet, #IIP and .all text",
-    suffix=".txt",
-    convention=Convention(
-        FRD,
-        (1, 1, -1),
-        "YPR",
-        "secondary",
-        "Kongsberg .kmall format, rev. J (axes, signs); the order is that of Kluster's and MB-System's code, not of "
-        "the "
-        "maker's text",
-        zero_to_360=True,
-    ),
-    write=_SHEET.write,
-    read=_read,
-    sensor="mbes",
+CONVENTION = Convention(
+    FRD,
+    (1, 1, -1),
+    "YPR",
+    "secondary",
+    "Kongsberg .kmall format, rev. J (axes, signs); the order is that of Kluster's and MB-System's code, not of the "
+    "maker's text",
+    zero_to_360=True,
 )
+TARGET = _SHEET.target("kongsberg", "Kongsberg SIS", CONVENTION, writes="entry sheet, #IIP and .all text", read=_read)

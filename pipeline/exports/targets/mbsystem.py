@@ -2,7 +2,9 @@
 
 mb_platform_math_rph2rot is Rz(heading) · Ry(pitch) · Rx(roll) in forward, starboard, down; positions are starboard,
 forward, up. The first offset of a multibeam is its transmitter, the second its receiver. The manual of mbmakeplatform
-calls roll "positive starboard up"; the code has starboard down, as written here.
+calls roll "positive starboard up"; the code has starboard down, as written here, and so has its reader of .kmall, which
+takes R, P, H of #IIP unchanged. An INS that is turned in the vessel stands there as sensor 0: the code composes its
+transpose with the sonar's rotation.
 """
 
 import numpy as np

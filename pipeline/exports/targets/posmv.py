@@ -6,12 +6,11 @@ twice turned x: R_reference_from_sensor = Rz(Z) · Ry(Y) · Rx(X) in forward, st
 
 from pipeline.exports.convention import FRD, Convention
 from pipeline.exports.sheet import Sheet
-from pipeline.exports.target import Target
 
 _SHEET = Sheet(
     groups=(
         (
-            "Settings, Installation, Lever Arms & Mounting Angles: Ref. to Sensor 1 Lever Arm",
+            "Settings, Installation, where sensor 1 stands: Ref. to Sensor 1 Lever Arm",
             {"x": "Lever arm X", "y": "Lever arm Y", "z": "Lever arm Z"},
         ),
         ("Sensor 1 Frame w.r.t. Ref. Frame", {"roll": "Angle X", "pitch": "Angle Y", "yaw": "Angle Z"}),
@@ -27,18 +26,11 @@ _SHEET = Sheet(
         "Order in the dialog: X, Y, Z of the angles are roll, pitch, heading; they turn about Z first.",
     ),
 )
-TARGET = Target(
-    name="posmv",
-    title="Applanix POS MV",
-    writes="entry sheet, sensor 1",
-    suffix=".txt",
-    convention=Convention(
-        FRD,
-        (1, 1, -1),
-        "YPR",
-        "official",
-        "POS MV V5 guide, pp. 2-27 and 2-31; Applanix ICD 004089, messages 20 and 120",
-    ),
-    write=_SHEET.write,
-    read=_SHEET.read,
+CONVENTION = Convention(
+    FRD,
+    (1, 1, -1),
+    "YPR",
+    "official",
+    "POS MV V5 guide, pp. 2-27 and 2-31; Applanix ICD 004089, messages 20 and 120",
 )
+TARGET = _SHEET.target("posmv", "Applanix POS MV", CONVENTION, writes="entry sheet, sensor 1", sensor=None)

@@ -4,17 +4,36 @@ Both compose x' = H · P · R · x, heading about z, pitch about the turned x, r
 starboard.
 """
 
+from dataclasses import replace
+
 from pipeline.exports.convention import SFU, Convention
-from pipeline.exports.sheet import Sheet
-from pipeline.exports.target import Target
+from pipeline.exports.mounting import Mounting
+from pipeline.exports.sheet import DECIMALS, Sheet
+from pipeline.exports.target import Options, Target
 
 ORDER_SOURCE = "QPS, How-to Qinsy sign conventions and How-to Qinsy rotation matrices (signs, order)"
 AXES_SOURCE = (
-    "the axes are shown there in a drawing alone; NORBIT iWBMS manual 10.4.3, p. 91: X+ starboard, Y+ forward, Z+ up"
+    "heights are up there in words, X and Y in a drawing alone; NORBIT iWBMS manual 10.4.3, p. 91: X+ starboard, "
+    "Y+ forward, Z+ up"
 )
+QIMERA_SOURCE = f"Qinsy's, by the same maker, taken to hold in Qimera, whose manual does not state them: {ORDER_SOURCE}"
 CONVENTION = Convention(SFU, (1, 1, -1), "YPR", "secondary", f"{ORDER_SOURCE}; {AXES_SOURCE}")
+OF_QIMERA = replace(CONVENTION, source=f"{QIMERA_SOURCE}; {AXES_SOURCE}")
 POSITION = {"x": "X", "y": "Y", "z": "Z"}
 ANGLES = {"roll": "Roll", "pitch": "Pitch", "yaw": "Heading"}
+
+
+def _arrays(target: Target, mounting: Mounting, _: Options) -> list[str]:
+    """Return what stands for the transmitter, where the editor has it apart from the receiver."""
+    if mounting.projector_offset_m is None:
+        return [
+            "If the editor has transmitter and receiver apart: the same angles in both; the position above is the",
+            "receiver's. For the transmitter's export again with --projector-offset (0 0 0: both at one point).",
+        ]
+    place = target.convention.numbers(mounting.arrays()[0]).by_role()
+    where = ", ".join(f"{name} {place[role]:.{DECIMALS}f}" for role, name in POSITION.items())
+    return [f"If the editor has transmitter and receiver apart: the same angles in both. Transmitter, m: {where}."]
+
 
 _QINSY = Sheet(
     groups=(
@@ -35,26 +54,9 @@ _QIMERA = Sheet(
     zeros="Must be zero: the calibration (patch test) results of the same sonar that Qimera's own tool has stored.",
     notes=(
         "Loading a session replaces what stands in the vessel editor: enter the values after the import.",
-        "A head of two arrays has a transmitter and a receiver: enter the same angles in both.",
+        "They hold if position and motion sensor stand at 0, 0, 0 there, without angles of their own.",
     ),
+    extra=_arrays,
 )
-QINSY = Target(
-    name="qinsy",
-    title="QPS Qinsy",
-    writes="entry sheet",
-    suffix=".txt",
-    convention=CONVENTION,
-    write=_QINSY.write,
-    read=_QINSY.read,
-    sensor="mbes",
-)
-QIMERA = Target(
-    name="qimera",
-    title="QPS Qimera",
-    writes="entry sheet",
-    suffix=".txt",
-    convention=CONVENTION,
-    write=_QIMERA.write,
-    read=_QIMERA.read,
-    sensor="mbes",
-)
+QINSY = _QINSY.target("qinsy", "QPS Qinsy", CONVENTION)
+QIMERA = _QIMERA.target("qimera", "QPS Qimera", OF_QIMERA)

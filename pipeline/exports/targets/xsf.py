@@ -1,7 +1,8 @@
 """SONAR-netCDF4 (XSF): variables of group Platform, as JSON.
 
-Rotations are those that turn the transducer's axes onto the platform's (forward, starboard, down), Rz · Ry · Rx,
-degrees, calibration included.
+R_platform_from_transducer = Rz(rotation_z) · Ry(rotation_y) · Rx(rotation_x), right-handed, degrees, the results of a
+calibration included; both frames are forward, starboard, down. ``transducer_function`` is receive_only 0, transmit_only
+1, monostatic 3.
 """
 
 import json
@@ -23,7 +24,7 @@ NAMES = {
     "pitch": "transducer_rotation_y",
     "yaw": "transducer_rotation_z",
 }
-TRANSMITTER, RECEIVER = 0, 1  # transducer_function: transmit alone, receive alone
+RECEIVER, TRANSMITTER, BOTH = 0, 1, 3  # transducer_type_t: receive_only, transmit_only, monostatic
 
 
 def _write(target: Target, mounting: Mounting, options: Options) -> str:
@@ -47,7 +48,9 @@ def _read(target: Target, text: str, where: str, _: Options) -> Mounted:
         raise ConfigError(f"{where}: has no group Platform; write its variables as JSON")
     functions = platform.get("transducer_function")
     receivers = (
-        [place for place, value in enumerate(functions) if value != TRANSMITTER] if isinstance(functions, list) else []
+        [place for place, value in enumerate(functions) if value in (RECEIVER, BOTH)]
+        if isinstance(functions, list)
+        else []
     )
     if len(receivers) != 1:
         raise ConfigError(
@@ -68,7 +71,11 @@ TARGET = Target(
     writes="JSON of the variables",
     suffix=".json",
     convention=Convention(
-        FRD, (1, 1, -1), "YPR", "official", "ICES SONAR-netCDF4 2, docs/tablePlatform.adoc (rotations about x, y, z)"
+        FRD,
+        (1, 1, -1),
+        "YPR",
+        "official",
+        "ICES SONAR-netCDF4 2, docs/crr341.adoc (axes, signs, order), docs/tablePlatform.adoc (names, functions)",
     ),
     write=_write,
     read=_read,

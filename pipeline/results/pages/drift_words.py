@@ -1,6 +1,5 @@
 """What the drift of the INS by the data means against its configured figures, in words for the report."""
 
-from collections.abc import Mapping, Sequence
 from typing import Any
 
 import pandas as pd
@@ -19,7 +18,7 @@ def drift_rows(figures: pd.DataFrame) -> list[dict[str, Any]]:
     figures
         The table ``drift_figures``.
     """
-    return [{**row, "unit": UNIT[row["figure"].rpartition("_")[2]]} for row in _estimated(figures)]
+    return [row | {"unit": UNIT[row["figure"].rpartition("_")[2]]} for row in _estimated(figures)]
 
 
 def drift_sentence(figures: pd.DataFrame) -> str:
@@ -52,8 +51,8 @@ def drift_sentence(figures: pd.DataFrame) -> str:
     )
 
 
-def _estimated(figures: pd.DataFrame) -> Sequence[Mapping[str, Any]]:
-    rows: list[Any] = figures.to_dict("records")
+def _estimated(figures: pd.DataFrame) -> list[dict[str, Any]]:
+    rows = ({str(key): value for key, value in row.items()} for row in figures.to_dict("records"))
     return [row for row in rows if row["sigma_log"]]
 
 
