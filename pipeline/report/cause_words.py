@@ -106,7 +106,8 @@ def words_of(row: Mapping[Any, Any]) -> str:
         size = size_words(1e3 * abs(value), 1e3 * sigma, "mm").removeprefix("+")
         return (
             f"the transmitter sits {farther} than mbes.projector_offset_m says (null: where the receiver is), by "
-            f"{size} in the sonar's own axes; measure it at the head, or find out to which point the head reduces its ranges"
+            f"{size} in the sonar's own axes; measure it at the head, or find out to which point the head reduces its "
+            "ranges"
         )
     if name.startswith("laser_rotation"):
         angle = size_words(np.degrees(value), np.degrees(sigma), "°")
