@@ -74,6 +74,7 @@ def render_page(template: str, **values: Any) -> str:
         lstrip_blocks=True,
     )
     environment.filters["breakable"] = breakable
+    environment.filters["translated"] = translated
     fixed = {"css": css_text, "picture_px": round(96 * WIDTH_IN), "margin_text": Markup(MARGIN_TEXT)}
     return translated_page(environment.get_template(template).render(**fixed, **values))
 
@@ -112,6 +113,17 @@ def _translate(figure: Figure) -> None:
 @functools.cache
 def fonts_of(code: str) -> list[str]:
     """Return the names of this machine's fonts with the letters of a language, the usual ones first."""
+    found = _known_fonts(code)
+    if not found:  # matplotlib keeps a list of fonts from its first call on; one may have been installed since
+        known = {font.fname for font in font_manager.fontManager.ttflist}
+        for path in sorted(set(font_manager.findSystemFonts()) - known):
+            with contextlib.suppress(OSError, RuntimeError):  # a file that is no font, or of a kind that it cannot read
+                font_manager.fontManager.addfont(path)
+        found = _known_fonts(code)
+    return found
+
+
+def _known_fonts(code: str) -> list[str]:
     there = {font.name for font in font_manager.fontManager.ttflist}
     return [name for name in FONTS.get(code, ()) if name in there]
 
