@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from pipeline.console import plural
+from pipeline.language.chosen import translated
 from pipeline.results.answer_text import answer_lines
 from pipeline.results.mount_difference import Row
 from pipeline.results.units import quantity_text
@@ -17,7 +18,7 @@ def difference_text(difference: Mapping[str, Any]) -> str:
     """Return the difference as text for the screen, the answer first. Values that are equal in both are not listed."""
     lines = [*answer_lines(difference), ""]
     lines += [
-        f"{key}: {difference[key]['session']} ({difference[key]['verdict']}), {difference[key]['run']}"
+        f"{key}: {difference[key]['session']} ({translated(difference[key]['verdict'])}), {difference[key]['run']}"
         for key in ("a", "b")
     ]
     if any(row["difference"] for row in difference["parameters"]):

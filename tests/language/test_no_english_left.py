@@ -1,5 +1,6 @@
 """In Chinese nothing stays English: pages, pictures and screen of runs, laser runs, check, diff and history."""
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -70,8 +71,9 @@ def test_two_runs_and_many(done: Place, undisturbed: tuple[Path, Told], monkeypa
     for day, shift in enumerate((0.0, 0.0, 0.06, 0.06), 1):
         planted(folder, done.run, f"run{day}", day, z_m=shift)
     planted(folder, done.run, "refused", 5, verdict="rejected", nothing=True)
-    page = done.folder / "diff.html"
-    texts = screen(poolcal("diff", undisturbed[0], done.run, "--html", page))
+    page, before = done.folder / "diff.html", done.folder / "甲"  # a name that is no English word
+    shutil.copytree(undisturbed[0], before)
+    texts = screen(poolcal("diff", before, done.run, "--html", page))
     texts += screen(poolcal("history", folder)) + texts_of_page(folder / "history" / "history.html")
     texts += texts_of_page(page) + (pictures if fonts_of("zh") else [])
     assert_chinese(texts, done.folder, "run1", "run2", "run3", "run4", "refused")

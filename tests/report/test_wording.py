@@ -122,7 +122,8 @@ OTHERS: list[tuple[Callable[[], Iterable[Statement]], ReasonCode, str]] = [
     (
         lambda: errors_allowed_for(pd.DataFrame([PROJECTOR]), 0.001),
         ReasonCode.ERROR_ALLOWED_FOR,
-        "the mount allows for this, the survey does not yet: the transmitter sits 119 ± 5 mm higher than mbes.proj",
+        "the mount allows for this, the survey does not yet: the transmitter sits higher than "
+        "mbes.projector_offset_m says (null: where the receiver is), by 119 ± 5 mm in",
     ),
     (
         lambda: geometry_gaps(gaps("one pass alone"), SIGMA),

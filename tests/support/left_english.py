@@ -21,7 +21,7 @@ SAME = {  # words that are the same in every language
     "axes, symbols and formulas": "x y z a b c e w t H P1 P2 P3 R_z cos sin exp",
     "names of the field": (
         "INS IMU GNSS RTK PPK MBES LiDAR RANSAC WGS84 WGS ITRF CGCS2000 EGM2008 "
-        "TVU THU DVL TPU IHO S-44 NED ENU Helmert"
+        "TVU THU DVL TPU IHO S-44 NED ENU Helmert RMS"
     ),
     "stages, by the names of their folders and commands": "ingest georeference segment adjust offsets report",
     "words that surveyors use as they are": "ping",

@@ -165,7 +165,7 @@ REASONS: list[tuple[dict[str, Any], ReasonCode, str]] = [  # evidence, code, wor
     (
         {"freed": {"unknown": "projector_x", "value": -0.0204, "sigma": 0.0008}},
         ReasonCode.SUSPECTED_CAUSE,
-        "the transmitter sits 20.4 ± 0.8 mm farther to port than",
+        "farther to port than mbes.projector_offset_m says (null: where the receiver is), by 20.4 ± 0.8 mm in",
     ),
     (
         {"freed": {"unknown": "mbes_incidence", "value": -0.01, "sigma": 3e-4}},
