@@ -189,7 +189,7 @@ def test_the_front_says_the_result_and_the_appendix_the_rest(undisturbed: tuple[
     appendix = headings.index("Appendix: for experts")
     front, back = headings[:appendix], headings[appendix:]
     assert {"The sonar's mount", "Residuals", "Passes", "Data", "Provenance"} <= set(front)
-    ways = "Four ways to the same mount parameters"
+    ways = "The same mount parameters in 4 ways"
     settings = "Settings that are not the defaults"
     assert {"Correlations", ways, "Agreement of the planes", "Points", settings} <= set(back)
 

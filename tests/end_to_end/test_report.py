@@ -61,7 +61,7 @@ def test_the_literal_form_stands_beside_the_others_with_its_warning(undisturbed:
         assert float(row[5].split()[0]) == pytest.approx(literal - adjusted, abs=5.1e-5)
     warning, steps = methods["patent_literal"]["warning"], methods["patent_literal"]["iterations"]
     assert methods["patent_literal"]["converged"]
-    assert f" Form (0): {warning}; it converged in {steps} steps." in " ".join(page.text.split())
+    assert f" Form (0): {warning}. It converged in {steps} steps." in " ".join(page.text.split())
 
 
 def test_files_counts_settings_and_origin_are_listed(undisturbed: tuple[Path, Told]) -> None:
