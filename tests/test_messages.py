@@ -107,7 +107,7 @@ def test_a_session_in_the_pools_place(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("run", "s"), "missing: --config FILE: the pool's YAML file, which says where the target is; begin with"),
+        (("run", "s"), "missing: --config FILE: the pool's YAML file, which says where the target is; poolcal init"),
         (("run", "s", "--config", "p"), "missing: --run RUN: the folder for the results"),
         (("plan", "p"), "missing: --session SESSION: the folder with session.yaml"),
         (("nonsense",), "No such command 'nonsense'; see poolcal --help"),

@@ -1,5 +1,6 @@
 """Printing of text for people, in the language of this process."""
 
+import re
 import sys
 from typing import TextIO
 
@@ -7,6 +8,17 @@ from pipeline.console import printable
 from pipeline.errors import ArtefactError
 from pipeline.language.chosen import translated
 from pipeline.language.letters import has_wide
+
+# A command to be typed, indented, perhaps numbered, perhaps with its description behind it.
+_COMMAND = re.compile(r"(?P<command>\s+(?:\d+\s+)?(?:\S*/)?poolcal [a-z].*?)(?P<gap>\s{2,}|$)(?P<words>.*)")
+
+
+def _spoken(line: str) -> str:
+    """Return a line in the language of this process. What is to be typed stays as it is."""
+    command = _COMMAND.fullmatch(line)
+    if command is not None:
+        return command["command"] + command["gap"] + translated(command["words"])
+    return line if has_wide(line) else translated(line)
 
 
 def say(text: str, stream: TextIO, as_is: bool = False) -> None:
@@ -31,7 +43,7 @@ def say(text: str, stream: TextIO, as_is: bool = False) -> None:
     ArtefactError
         Standard output, which takes the program's answer, cannot be written.
     """
-    lines = "\n".join(printable(line if as_is or has_wide(line) else translated(line)) for line in text.split("\n"))
+    lines = "\n".join(printable(line if as_is else _spoken(line)) for line in text.split("\n"))
     try:
         print(lines, file=stream, flush=True)
     except BrokenPipeError:

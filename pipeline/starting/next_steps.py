@@ -8,6 +8,7 @@ from pathlib import Path
 from pipeline import CONFIGS
 from pipeline.config.fill_in import Unfilled, what
 from pipeline.console import plural
+from pipeline.language.chosen import translated
 from pipeline.starting.file_groups import FileGroup
 from pipeline.starting.folder_survey import FolderSurvey
 from pipeline.starting.left_out_words import left_out_lines
@@ -52,30 +53,39 @@ def steps_text(session: Path, pool: Path | None, open_keys: Sequence[tuple[Path,
     if mounts:
         sensors = " and ".join(sorted({one.key.partition(".")[0] for one in mounts}))
         steps.append(
-            f"The mounts of {sensors}: survey marks, fill in a copy of\n"
-            f"     {shlex.quote(str(CONFIGS / 'marks.yaml'))}\n   and let poolcal write them\n"
-            f"     {command('coarse', 'MARKS.yaml', '--session', session)}\n"
-            f"   or measure them, and fill them in by hand."
+            [
+                f"The mounts of {sensors}: survey marks, fill in a copy of this file, and let poolcal write them; or "
+                "fill them in by hand:",
+                shlex.quote(str(CONFIGS / "marks.yaml")),
+                command("coarse", "MARKS.yaml", "--session", session),
+            ]
         )
     config = pool or "POOL.yaml"
     check = command("check", session, "--config", config)
-    steps.append(f"See whether the files are good, best while the boat is still in the water\n     {check}")
-    steps.append(f"Calibrate\n     {command('run', session, '--config', config, '--run', 'RUN')}")
-    steps.append(
-        "Enter the values in the survey's software, prove that they are right there, and print the certificate (its\n"
-        f"   names: about in session.yaml)\n     {command('export', 'RUN', '--to', 'NAME')}\n"
-        f"     {command('check-entry', 'RUN', 'SOUNDINGS')}\n     {command('report', 'RUN', '--pdf', 'FILE.pdf')}"
-    )
-    return "\n".join(["Left to be done:", *(f"{number}. {step}" for number, step in enumerate(steps, 1))])
+    run = command("run", session, "--config", config, "--run", "RUN")
+    steps += [
+        ["See whether the files are good, best while the boat is still in the water:", check],
+        ["Calibrate, with verdict and report:", run],
+        [
+            "Enter the values in the survey's software, and prove that they are right there:",
+            command("export", "RUN", "--to", "NAME"),
+            command("check-entry", "RUN", "SOUNDINGS"),
+        ],
+        ["Print the certificate (its names: about in session.yaml):", command("report", "RUN", "--pdf", "FILE.pdf")],
+    ]
+    lines = ["Left to be done:"]
+    for number, (words, *below) in enumerate(steps, 1):
+        lines += [f"{number}. {translated(words)}", *(f"     {line}" for line in below)]
+    return "\n".join(lines)
 
 
-def _to_fill_in(open_keys: Sequence[tuple[Path, Sequence[Unfilled]]], mounts: Sequence[Unfilled]) -> list[str]:
+def _to_fill_in(open_keys: Sequence[tuple[Path, Sequence[Unfilled]]], mounts: Sequence[Unfilled]) -> list[list[str]]:
     """Return a step for each file in which keys other than mounts are open: poolcal coarse needs them filled in."""
-    steps = []
+    steps: list[list[str]] = []
     for path, missing in open_keys:
         others = [one for one in missing if one not in mounts]
         if others:
-            steps.append("\n".join([f"Fill in {path}:", *(f"     {line}" for line in _by_block(others))]))
+            steps.append([f"Fill in {path}:", *_by_block(others)])
     return steps
 
 

@@ -133,7 +133,7 @@ def test_about_is_text_and_makes_nothing_stale(done: Place, right: dict[str, str
     assert page.table("", "name", "date")[0][1] == "Wang Li"
     assert "epoch 2026.4" in text
     assert "report number not stated" in text
-    assert "about." not in "".join(row[1] for row in page.table("file", "key", "value"))
+    assert "about." not in "".join(row[1] for row in page.table("from", "key", "value"))
 
 
 def test_a_rejected_run_is_marked_and_has_no_line_to_sign(done: Place) -> None:

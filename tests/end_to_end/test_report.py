@@ -267,7 +267,7 @@ def test_compared_as_a_page(undisturbed: tuple[Path, Told], tmp_path: Path) -> N
     assert not page.named("b")
     kept = digests(run)
     for place, words in (
-        (tmp_path / "no" / "such" / "folder.html", "cannot be written"),
+        (tmp_path / "no" / "such" / "folder.html", "there is no folder"),
         (run / "report" / "page.html", "lies in the folder"),
         (run / "report" / "calibration.json", "ends in .html"),
         ("/dev/null", "ends in .html"),

@@ -7,9 +7,9 @@ import pytest
 
 from pipeline.results.pages.rendering import fonts_of
 from stages.commands.draw import Drawings, draw_missing
-from tests.end_to_end.test_history import planted
 from tests.support.left_english import english_of, texts_of_page, watch_pictures
 from tests.support.places import Place, Told, poolcal
+from tests.support.planted_runs import planted
 
 NAMES = ("undisturbed", "session", "small", "2026-05-12_small", "runs/a")
 

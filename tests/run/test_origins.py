@@ -1,7 +1,9 @@
 """Where a run's figures come from: the files' own keys, a preset, the INS's files, or nobody."""
 
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from pipeline.config.instruments import PRESETS
 from pipeline.config.load import load_pool, stated_keys
@@ -81,19 +83,23 @@ def test_an_older_run_does_not_claim_to_know(tmp_path: Path) -> None:
     assert not is_recorded(older)
 
 
+def _said(groups: Iterable[Mapping[str, Any]]) -> str:
+    return " | ".join(f"{group['words']} ({', '.join(group['figures'])})" for group in groups)
+
+
 def test_the_certificate_names_what_nobody_stated(tmp_path: Path) -> None:
-    groups = " | ".join(assumed_groups(_settings(tmp_path, session(tmp_path)), False))
+    groups = _said(assumed_groups(_settings(tmp_path, session(tmp_path)), False))
     assert "slow errors of the INS (horizontal 15 mm, vertical 20 mm, roll and pitch 0.01°" in groups
     assert "the laser's own mount (angles 0.005°, lever arm 1.5 mm)" in groups
     assert "clocks (of the laser 0.2 ms, of the sonar 0.5 ms)" in groups
     assert "sound speed (0.2 m/s, 0.1 m/s per metre of depth)" in groups
     stated = {"mount_sigma": {"angle_deg": 0.005}, "latency_sigma_s": 0.0002}
     found = session(tmp_path, laser=stated, ins={"drift": {"heading_deg": 0.03}})
-    groups = " | ".join(assumed_groups(_settings(tmp_path, found), False))
+    groups = _said(assumed_groups(_settings(tmp_path, found), False))
     assert "the laser's own mount (lever arm 1.5 mm)" in groups
     assert "clocks (of the sonar 0.5 ms)" in groups
     assert "heading" not in groups
-    of_files = " | ".join(assumed_groups(_settings(tmp_path, session(tmp_path)), True))
+    of_files = _said(assumed_groups(_settings(tmp_path, session(tmp_path)), True))
     assert "slow errors of the INS (time constant 200 s)" in of_files
 
 

@@ -100,6 +100,7 @@ def test_an_unknown_face_is_refused(tmp_path, quiet):
     pool = dict(quiet.pool) | {"as_built": {"faces": {"P9-0": 0.001}}}
     path = tmp_path / "pool.yaml"
     path.write_text(yaml.safe_dump(pool))
+    (tmp_path / "session.yaml").write_text(yaml.safe_dump(quiet.session))
     with pytest.raises(ConfigError, match=r"as_built.faces: 'P9-0': no face of this target; its faces are .*P1-0-top"):
         load_settings(tmp_path, path)
 
