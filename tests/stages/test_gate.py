@@ -18,6 +18,7 @@ def gate_and_scatter(found: Any) -> tuple[float, float]:
     return float(found["segment/provisional_mount"]["gate_m"].iloc[0]), float(rms_m.max())
 
 
+@pytest.mark.thorough
 def test_a_gate_is_widened_for_the_noisiest_family(errors_of: Any) -> None:
     """Soundings of the slanted faces nine times as noisy as the wall's: as the search left the gate, ±1.1 of their
     sigmas, the mount would be wrong by 0.25° and 15 mm, seven total sigmas, and accepted."""

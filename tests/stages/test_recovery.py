@@ -131,6 +131,7 @@ def test_wrong_sound_speed_is_put_right_in_range_and_steering(errors_of):
     assert right[3:].max() < EXACT_MM
 
 
+@pytest.mark.thorough
 def test_a_cast_puts_a_wrong_speed_at_the_head_right(errors_of):
     """Water of one speed, the head working with another: by the cast alone range and steering are recomputed, also of
     beams that look along the level."""
