@@ -81,7 +81,7 @@ def test_a_certificate_is_two_sheets(place: Place, program: str) -> None:
         assert words in sheets[1]
     assert "Thesonar'smount" in sheets[2]
     for number, sheet in enumerate(sheets, 1):
-        assert f"{number}of{len(sheets)}" in sheet
+        assert f"{number}/{len(sheets)}" in sheet
     assert marks_on(pdf)[:2] == [0, 0]
 
 

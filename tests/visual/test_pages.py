@@ -116,7 +116,7 @@ def test_on_paper_nothing_is_cut(page: Path, tmp_path: Path) -> None:
         head = "".join(title.split())[:20]
         assert sheets[-1].startswith(head) or head in sheets[-1][:60]  # which session, and the verdict, on each sheet
     for number, sheet in enumerate(sheets, 1):
-        assert f"{number}of{len(sheets)}" in sheet
+        assert f"{number}/{len(sheets)}" in sheet
     whole = "".join(sheets)
     taken = Page(page.read_text(encoding="utf-8"))
     named = [attributes.get("class") or "" for attributes in taken.named("table")]
