@@ -11,18 +11,12 @@ Every other exception is a bug: it keeps its traceback, and the program ends wit
 iteration that only makes the calibration poor, are results (a rejected verdict, status 1), never errors.
 """
 
-from collections.abc import Iterable
-
 
 class PoolcalError(Exception):
-    """A mistake outside the program. Its message is one line: the mistake, its place, the value, and the remedy.
+    """A mistake outside the program. Its message is one line: the mistake, its place, the value, and the remedy."""
 
-    ``details``: lines that the screen shows below it, where one line cannot hold a list.
-    """
-
-    def __init__(self, message: str, details: Iterable[str] = ()) -> None:
+    def __init__(self, message: str) -> None:
         super().__init__(" ".join(message.split()))
-        self.details = tuple(" ".join(line.split()) for line in details)
 
 
 class ConfigError(PoolcalError):

@@ -1,6 +1,6 @@
 """Values that a person must still fill in. ``poolcal init`` marks them, and no command takes the mark for a value."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
@@ -9,7 +9,6 @@ from typing import Any
 import yaml
 
 from pipeline.config.yaml_file import compose, content_of, text_of
-from pipeline.console import plural
 from pipeline.errors import ConfigError
 
 MARK = "FILL_IN"
@@ -93,7 +92,7 @@ def is_unfilled(value: Any) -> bool:
 
 
 def refuse_unfilled(texts: Mapping[Path, str], may_be: Callable[[Unfilled], bool] = lambda _: False) -> None:
-    """Raise a ConfigError that names all keys still to be filled in, each on a line with file, line and meaning.
+    """Raise a ConfigError, one line, that names all keys still to be filled in, with their lines and their meaning.
 
     Parameters
     ----------
@@ -103,19 +102,26 @@ def refuse_unfilled(texts: Mapping[Path, str], may_be: Callable[[Unfilled], bool
         Whether a key may be left as it is, because the command fills it in.
     """
     missing = {path: [one for one in unfilled(text, path) if not may_be(one)] for path, text in texts.items()}
-    lines = [line for path, keys in missing.items() for line in _lines(path, keys)]
-    if lines:
-        files = " and ".join(str(path) for path, keys in missing.items() if keys)
-        raise ConfigError(f"{files}: {plural(len(lines), 'value')} still to be filled in, in place of {MARK}", lines)
+    named = {path: listed(keys) for path, keys in missing.items() if keys}
+    if named:
+        head = f"still to be filled in, in place of {MARK}"
+        raise ConfigError("; and ".join(f"{path}: {head}: {words}" for path, words in named.items()))
 
 
-def _lines(path: Path, missing: Sequence[Unfilled]) -> Iterator[str]:
-    """Yield a line for each key; the first key of a block that has words of its own has these as well."""
-    for block, keys in groupby(missing, lambda one: one.block):
-        for number, one in enumerate(keys):
-            words = [what(one.key), WHAT.get(block, "") if number == 0 else ""]
-            about = "; ".join(filter(None, words))
-            yield f"{path}:{one.line}: {one.key}" + (f" ({about})" if about else "")
+def listed(missing: list[Unfilled]) -> str:
+    """Return the text that lists keys, those of one block together."""
+    return "; ".join(words for block, keys in groupby(missing, lambda one: one.block) for words in _of(block, [*keys]))
+
+
+def _of(block: str, keys: list[Unfilled]) -> Iterator[str]:
+    """Yield the words of one block's keys: all of them in one if the table has words for the block, else one by one."""
+    if block in WHAT and len(keys) > 1:
+        names = ", ".join([keys[0].key, *(one.key.rpartition(".")[2] for one in keys[1:])])
+        yield f"lines {keys[0].line} to {keys[-1].line} {names} ({WHAT[block]})"
+        return
+    for one in keys:
+        words = what(one.key)
+        yield f"line {one.line} {one.key}" + (f" ({words})" if words else "")
 
 
 def read_filled(path: Path) -> dict[str, Any]:

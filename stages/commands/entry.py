@@ -21,10 +21,10 @@ interrupts: list[int] = []
 
 
 def refused(error: PoolcalError, debug: bool) -> int:
-    """Print the line of a refusal and its details, with ``debug`` its traceback too, and return the exit status."""
+    """Print the line of a refusal, with ``debug`` its traceback too, and return the exit status."""
     if debug:
         say(traceback.format_exc().rstrip(), sys.stderr, as_is=True)
-    say("\n".join([f"poolcal: {error}", *(f"  {line}" for line in error.details)]), sys.stderr)
+    say(f"poolcal: {error}", sys.stderr)
     return 2
 
 
