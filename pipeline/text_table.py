@@ -62,9 +62,18 @@ def wrapped(text: str, first: str = "", following: str = "  ") -> list[str]:
     >>> [len(line) for line in wrapped("word " * 30, "- ")]
     [96, 56]
     """
+    return in_lines(translated(text), first, following)
+
+
+def in_lines(text: str, first: str, following: str, columns: int = SCREEN) -> list[str]:
+    r"""Return a text as it is, in lines of at most so many columns; longer words stay whole.
+
+    >>> in_lines("横摇、纵摇", "", " ", 6)
+    ['横摇、', ' 纵摇']
+    """
     lines, line, begun = [], first, False
-    for piece in _PIECE.findall(translated(text)):
-        if begun and letters.width(line + piece) > SCREEN:
+    for piece in _PIECE.findall(text):
+        if begun and letters.width(line + piece) > columns:
             lines.append(line)
             line, begun = following, False
         line += piece if begun else piece.lstrip()

@@ -24,8 +24,8 @@ PLACES = (  # where texts for people are made
     "pipeline/adjustment", "pipeline/artefacts/count_codes.py", "pipeline/atomic_files.py", "pipeline/checking",
     "pipeline/coarse", "pipeline/config", "pipeline/console.py", "pipeline/entry_check", "pipeline/exports",
     "pipeline/fleet", "pipeline/georeference", "pipeline/maths", "pipeline/planning", "pipeline/readers",
-    "pipeline/report", "pipeline/results", "pipeline/run", "pipeline/starting", "pipeline/target", "stages/commands",
-    "stages/views",
+    "pipeline/report", "pipeline/results", "pipeline/run", "pipeline/starting", "pipeline/target", "stages/cli",
+    "stages/commands", "stages/views",
 )  # fmt: skip
 PROSE = re.compile(r"[A-Za-z]{2,}[,;:.]? +\(?[A-Za-z{]|\} [A-Za-z]{2,}")
 CODE = re.compile(r"[\w.*/{}\[\]:=-]*|(?:application|text)/.*|.*%[sd].*|<.*>|.*\.parquet.*|\^.*|.*\\\w.*", re.DOTALL)
@@ -62,7 +62,12 @@ def texts_of(path: Path) -> Iterator[tuple[str, int]]:
                     values |= {id(one) for one in ast.walk(part.value)}
                     skipped |= {id(one) for one in ast.walk(part.format_spec)} if part.format_spec else set()
         elif isinstance(node, (ast.Subscript, ast.Compare)):
+            skipped |= {id(one) for one in ast.walk(node) if not _is_annotated(node)}
+        elif isinstance(node, ast.keyword) and node.arg == "metavar":  # typed as it stands
             skipped |= {id(one) for one in ast.walk(node)}
+        elif isinstance(node, ast.FunctionDef) and _is_command(node):
+            for paragraph in (ast.get_docstring(node) or "").split("\n\n"):
+                yield paragraph, node.lineno
     for node in ast.walk(tree):
         if id(node) in skipped:
             continue
@@ -80,6 +85,16 @@ def _docstrings(tree: ast.AST) -> Iterator[ast.expr]:
             for one in node.body:
                 if isinstance(one, ast.Expr):
                     yield one.value
+
+
+def _is_annotated(node: ast.Subscript | ast.Compare) -> bool:
+    return isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name) and node.value.id == "Annotated"
+
+
+def _is_command(node: ast.FunctionDef) -> bool:
+    """Return whether the docstring of a function is the help of a command."""
+    calls = (one.func for one in node.decorator_list if isinstance(one, ast.Call))
+    return any(isinstance(called, ast.Attribute) and called.attr == "command" for called in calls)
 
 
 def _is_text(text: str) -> bool:

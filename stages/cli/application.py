@@ -7,7 +7,9 @@ import typer
 
 import pipeline
 from pipeline.language.speaking import say
+from stages.cli import help_text
 
+help_text.speak()
 app = typer.Typer(
     name="poolcal",
     help="Calibrates a boat's multibeam sonar against its laser scanner in a pool.",

@@ -96,7 +96,7 @@ def _repeat(
 
 @app.command("stage")
 def _stage(
-    name: Annotated[str, typer.Argument(metavar="NAME", help=f"one of {', '.join(ORDER)}")],
+    name: Annotated[str, typer.Argument(metavar="NAME", help=f"name of the stage to run, one of {', '.join(ORDER)}")],
     run_folder: RunFolder,
     session: Annotated[Path | None, typer.Option("--session", help="default: as in RUN/run.yaml")] = None,
     config: Annotated[Path | None, typer.Option("--config", help="default: as in RUN/run.yaml")] = None,
