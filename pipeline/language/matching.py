@@ -1,7 +1,9 @@
 """Find the sentence of a catalogue that a text is, and put its values into the translation.
 
 An entry of the catalogue is a sentence with places for values, such as ``{0} scatter {1} times as much as {2} says``.
-A text matches it if it has the same words with any values between them. The values are translated in the same way.
+A text matches it if it has the same words with any values between them. The values are translated in the same way,
+except those that the translation marks as names, ``{0!}``: a file, a key, an option is typed as it stands, even if it is
+called ``run`` or ``laser``.
 Where several entries match, the one that leaves the fewest words untranslated is taken, and of these the one with the
 most words of its own; one that leaves more words than it has matches by chance, and is not taken. A text that no
 entry matches is taken apart at full stops, semicolons, colons and commas, and its parts are translated; but a
@@ -15,10 +17,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 
 PLACE = re.compile(r"\{(\d+)\}")
+MARKED = re.compile(r"\{(\d+)(!?)\}")  # a place of a translation; with ! its value is a name, which stays as it is
 WORD = re.compile(r"[A-Za-z]{2,}")
 PLAIN = re.compile(  # a word of a sentence: no unit, and no part of a path or of a key
     r"(?<![\w./:=-])(?!(?:mm|cm|km|ms|min|deg)\b)[a-z]{2,}(?![\w/:=-]|\.\w)"
 )
+SENTENCE = re.compile(r"(?<![\w./])[a-z]{2,} [a-z]{2,} [a-z]{2,}(?![\w./])")
 BREAKS = {  # where a text may be taken apart, coarse ones first, and what stands there then
     "\n": "\n", ". ": "。", "; ": "；", ": ": "：", ", ": "，", " and ": "、", " or ": "或",
 }  # fmt: skip
@@ -37,7 +41,7 @@ class Catalogue:
     ----------
     entries
         Translations by English sentence. The places ``{0}``, ``{1}`` of a sentence stand in its translation too, in any
-        order.
+        order, those of names as ``{0!}``.
     """
 
     def __init__(self, entries: Mapping[str, str]) -> None:
@@ -110,8 +114,9 @@ class Catalogue:
             match = pattern.fullmatch(core)
             if match is None:
                 continue
-            values = [self.translated(value) for value in match.groups()]
-            left = sum(len(PLAIN.findall(value)) for value in values)
+            names = {int(number) for number, mark in MARKED.findall(translation) if mark}
+            values = [value if k in names else self.translated(value) for k, value in enumerate(match.groups())]
+            left = sum(_words_left(value, k in names) for k, value in enumerate(values))
             own = len(WORD.findall(PLACE.sub(" ", key)))
             if left > own:  # it matches by chance
                 continue
@@ -142,7 +147,16 @@ def _outside_brackets(core: str, mark: str) -> int:
 
 def _with_values(translation: str, values: Sequence[str]) -> str:
     """Return a translation with its values in their places."""
-    return PLACE.sub(lambda place: values[int(place[1])], translation)
+    return MARKED.sub(lambda place: values[int(place[1])], translation)
+
+
+def _words_left(value: str, is_name: bool) -> int:
+    """Return how many words of a sentence a value has. Names have none, unless they read like a sentence.
+
+    >>> _words_left("ingest, segment", is_name=True), _words_left("is late by it", is_name=True)
+    (0, 4)
+    """
+    return 0 if is_name and not SENTENCE.search(value) else len(PLAIN.findall(value))
 
 
 def _pattern(key: str) -> re.Pattern[str]:
@@ -177,11 +191,10 @@ def sentences_of(entries: Mapping[str, str]) -> dict[str, str]:
             continue
         for sentence, translation in zip(english, other, strict=True):
             numbers = PLACE.findall(sentence)
-            if sorted(numbers) == sorted(PLACE.findall(translation)) and WORD.search(PLACE.sub(" ", sentence)):
-                new = {old: f"{{{k}}}" for k, old in enumerate(numbers)}
-                turned = [
-                    PLACE.sub(lambda place, new=new: new[place[1]], text)
-                    for text in (sentence.strip(), translation.strip())
-                ]
-                found[turned[0]] = turned[1]
+            if sorted(numbers) == sorted(number for number, _ in MARKED.findall(translation)) and WORD.search(PLACE.sub(" ", sentence)):
+                new = {old: str(k) for k, old in enumerate(numbers)}
+                english_sentence = PLACE.sub(lambda place, new=new: f"{{{new[place[1]]}}}", sentence.strip())
+                found[english_sentence] = MARKED.sub(
+                    lambda place, new=new: f"{{{new[place[1]]}{place[2]}}}", translation.strip()
+                )
     return found
