@@ -21,11 +21,12 @@ ROOT = Path(__file__).parents[1]
 LANGUAGE = ROOT / "pipeline" / "language"
 TEMPLATES = ROOT / "pipeline" / "results" / "pages"
 PLACES = (  # where texts for people are made
-    "pipeline/adjustment", "pipeline/artefacts/count_codes.py", "pipeline/atomic_files.py", "pipeline/checking",
-    "pipeline/coarse", "pipeline/config", "pipeline/console.py", "pipeline/entry_check", "pipeline/exports",
-    "pipeline/fleet", "pipeline/georeference", "pipeline/maths", "pipeline/planning", "pipeline/readers",
-    "pipeline/report", "pipeline/results", "pipeline/run", "pipeline/starting", "pipeline/target", "stages/cli",
-    "stages/commands", "stages/views",
+    "pipeline/adjustment", "pipeline/artefacts/count_codes.py", "pipeline/artefacts/parquet.py",
+    "pipeline/artefacts/patent_tables.py", "pipeline/artefacts/streams.py", "pipeline/atomic_files.py",
+    "pipeline/checking", "pipeline/coarse", "pipeline/config", "pipeline/console.py", "pipeline/entry_check",
+    "pipeline/exports", "pipeline/fleet", "pipeline/georeference", "pipeline/language/chosen.py", "pipeline/maths",
+    "pipeline/planning", "pipeline/readers", "pipeline/report", "pipeline/results", "pipeline/run",
+    "pipeline/simulation", "pipeline/starting", "pipeline/target", "stages",
 )  # fmt: skip
 PROSE = re.compile(r"[A-Za-z]{2,}[,;:.]? +\(?[A-Za-z{]|\} [A-Za-z]{2,}")
 CODE = re.compile(r"[\w.*/{}\[\]:=-]*|(?:application|text)/.*|.*%[sd].*|<.*>|.*\.parquet.*|\^.*|.*\\\w.*", re.DOTALL)

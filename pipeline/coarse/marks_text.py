@@ -116,14 +116,14 @@ def _residuals(assessment: MarksAssessment) -> Iterator[MarkResidual]:
 
 
 def _residual_lines(assessment: MarksAssessment) -> list[str]:
-    lines = []
+    rows = []
     for row in _residuals(assessment):
-        numbers = "".join(f"{signed(value, 1):>9}" for value in row.residual_mm)
-        tested = "  an error of it would not show"
+        tested, words = ["", ""], "an error of it would not show"
         if row.test is not None:
-            tested = f"{_normalised(row.test):>9.1f}{np.sqrt(row.test.limit / row.test.rank):>6.1f}"
-        lines.append(f"  {row.frame:<6}{row.mark:<14}{numbers}{tested}{'  suspicious' if row.is_suspicious else ''}")
-    return lines
+            tested = [f"{_normalised(row.test):.1f}", f"{np.sqrt(row.test.limit / row.test.rank):.1f}"]
+            words = "suspicious" if row.is_suspicious else ""
+        rows.append([row.frame, row.mark, *(signed(value, 1) for value in row.residual_mm), *tested, words])
+    return text_table("  <6<14>9>9>9>9>6  <1", [], rows)[1:]
 
 
 def _global_line(assessment: MarksAssessment) -> str:

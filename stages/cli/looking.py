@@ -15,7 +15,9 @@ from stages.cli.arguments import AsJson, Day, RunFolder
 def _view(
     first: RunFolder,
     second: Annotated[Path | None, typer.Argument(metavar="[RUN]", help="another run, shown beside the first")] = None,
-    stage: Annotated[str | None, typer.Option(help=f"recordings of one stage alone, by its name: {', '.join(ORDER)}")] = None,
+    stage: Annotated[
+        str | None, typer.Option(help=f"recordings of one stage alone, by its name: {', '.join(ORDER)}")
+    ] = None,
 ) -> int:
     """Open a run's recordings in the Rerun viewer, or two runs side by side.
 

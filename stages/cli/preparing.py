@@ -29,9 +29,7 @@ def _init(
 @app.command("check")
 def _check(
     session: Session,
-    config: Annotated[
-        Path | None, typer.Option("--config", metavar="CONFIG", help=f"{POOL_FILE}: where it is")
-    ] = None,
+    config: Annotated[Path | None, typer.Option("--config", metavar="CONFIG", help=f"{POOL_FILE}: where it is")] = None,
     as_json: AsJson = False,
 ) -> int:
     """Look into a session's files before calibrating, in seconds. Status 1 if something is wrong."""
