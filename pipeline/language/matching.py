@@ -78,7 +78,7 @@ class Catalogue:
         return Found(f"{begin}{found.text}{end}", found.left)
 
     def _sentence(self, core: str) -> Found:
-        if core.startswith(SPEAKER):  # of every complaint: it is no part of the sentence
+        if core.startswith(SPEAKER) and core not in self._exact:  # of every complaint: it is no part of the sentence
             return _joined(Found(SPEAKER[:-2], 0), BREAKS[": "], self._found(core.removeprefix(SPEAKER)))
         found = self._whole(core)
         stop = FULL_STOP.get(core[-1], "")
