@@ -18,7 +18,7 @@ from pipeline.entry_check.run_soundings import EntrySource
 from pipeline.entry_check.ways import EACH_VALUE, OWN, PLAIN
 
 Array = NDArray[np.float64]
-PART_NAMES = ANGLES, LEVER_ARM = "angles: ", "lever arm: "
+ANGLES, LEVER_ARM = "angles: ", "lever arm: "
 MOST_ATTITUDE_DEG = 5.0  # by more no INS is aligned wrongly
 UNKNOWN_ANGLES, OTHER_POINT, ATTITUDES = "unknown_angles", "other_point", "attitudes"
 

@@ -1,6 +1,5 @@
 """The answer of a check in words and as JSON."""
 
-import textwrap
 from collections.abc import Iterator
 from typing import Any
 
@@ -9,15 +8,12 @@ import numpy as np
 from pipeline.console import plural, signed
 from pipeline.entry_check.answer import Answer
 from pipeline.entry_check.check import EntryCheck
-from pipeline.entry_check.explanations import PART_NAMES, Explanation
+from pipeline.entry_check.explanations import Explanation
 from pipeline.entry_check.judging import TOLERANCE_DEG, TOLERANCE_M
-from pipeline.language.chosen import translated
-from pipeline.language.letters import has_wide
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.mount import Mounted, setting_change
-from pipeline.text_table import text_table
+from pipeline.text_table import text_table, wrapped
 
-WIDTH = 100
 BULLET = "  - "
 COARSE_M = 0.002
 SHOWN_EXCESS_M = 0.002  # a smaller scatter beyond rounding is not worth a word
@@ -32,22 +28,14 @@ def check_text(check: EntryCheck) -> str:
 
 
 def _wrapped(text: str, indent: str) -> list[str]:
-    """Return a sentence in lines, in the language of this process; one whose letters are wide stays one line."""
-    bullet, text = (BULLET, text.removeprefix(BULLET)) if text.startswith(BULLET) else ("", text)
-    words = translated(text)
-    if has_wide(words):
-        return [bullet + words]
-    return textwrap.wrap(bullet + words, WIDTH, subsequent_indent=" " * len(bullet) or indent)
+    """Return a sentence in lines, in the language of this process."""
+    if text.startswith(BULLET):
+        return wrapped(text.removeprefix(BULLET), BULLET, " " * len(BULLET))
+    return wrapped(text, following=indent)
 
 
 def _joined(explanation: Explanation) -> str:
-    """Return its sentences; what begins with the part's name is translated part by part."""
-    return "; ".join("".join(map(translated, _named(words))) for words in explanation.words)
-
-
-def _named(words: str) -> tuple[str, ...]:
-    name = next((name for name in PART_NAMES if words.startswith(name)), "")
-    return (name, words.removeprefix(name)) if name else (words,)
+    return "; ".join(explanation.words)
 
 
 def _answer(check: EntryCheck) -> Iterator[str]:

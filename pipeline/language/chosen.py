@@ -2,7 +2,7 @@
 
 import contextlib
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
 
@@ -69,12 +69,17 @@ def in_english() -> Iterator[None]:
 
 def translated(text: str) -> str:
     """Return a text in the language of this process; as it is if there is no translation."""
-    return _translation(language())(text)
+    code = language()
+    return text if code == ENGLISH else catalogue_of(code).translated(text)
 
 
-@lru_cache(maxsize=4)
-def _translation(code: str) -> Callable[[str], str]:
-    return str if code == ENGLISH else catalogue_of(code).translated
+def wholly_translated(text: str) -> str:
+    """Return a text in the language of this process if none of it stays English; else as it is.
+
+    A text with letters of that language is either a sentence with a name in them, or has been translated before.
+    """
+    code = language()
+    return text if code == ENGLISH else catalogue_of(code).wholly_translated(text)
 
 
 @lru_cache(maxsize=4)

@@ -69,6 +69,11 @@ class Catalogue:
         """Return the text in the other language; what the catalogue does not have stays English."""
         return self._found(text).text
 
+    def wholly_translated(self, text: str) -> str:
+        """Return the text in the other language if no word of it stays English; else as it is."""
+        found = self._found(text)
+        return text if found.left else found.text
+
     def _find(self, text: str) -> Found:
         core = text.strip()
         if not WORD.search(core) or len(core) > MOST_LETTERS:
@@ -205,7 +210,7 @@ def _are_values(match: re.Match[str], translation: str) -> bool:
         leading = match.start(number + 1) == 0
         if number in names and _goes_on(value, leading):
             return False
-        if not _is_whole(value) or (leading and value.rstrip().endswith(":")):
+        if not _is_whole(value) or (leading and (value.rstrip().endswith(":") or value.startswith((",", ";")))):
             return False
         if "; " in value and not re.search(rf"\{{{number}[!#]?\}}(?:[，。；：）{{]|$)", translation):
             return False

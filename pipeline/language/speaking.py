@@ -6,11 +6,12 @@ from typing import TextIO
 
 from pipeline.console import printable
 from pipeline.errors import ArtefactError
-from pipeline.language.chosen import translated
+from pipeline.language.chosen import translated, wholly_translated
 from pipeline.language.letters import has_wide
 
 # A command to be typed, indented, perhaps numbered, perhaps with its description behind it.
 _COMMAND = re.compile(r"(?P<command>\s+(?:\d+\s+)?(?:\S*/)?poolcal [a-z].*?)(?P<gap>\s{2,}|$)(?P<words>.*)")
+_TABLE = re.compile(r"\S {2,}\S")  # blanks between two columns
 
 
 def _spoken(line: str) -> str:
@@ -18,13 +19,15 @@ def _spoken(line: str) -> str:
     command = _COMMAND.fullmatch(line)
     if command is not None:
         return command["command"] + command["gap"] + translated(command["words"])
-    return line if has_wide(line) else translated(line)
+    if not has_wide(line):
+        return translated(line)
+    return line if _TABLE.search(line) else wholly_translated(line)
 
 
 def say(text: str, stream: TextIO, as_is: bool = False) -> None:
     """Print lines of text to a stream, in the language of this process.
 
-    A line that has words of that language already is not translated again: a table, whose cells were.
+    A line of a table, whose cells are translated, is not translated again.
 
     The program goes on if the reader of a pipe has ended. It also goes on if standard error cannot be written, because
     an error message would go to the same place.

@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.results.pages.rendering import fonts_of
 from stages.commands.draw import Drawings, draw_missing
-from tests.support.left_english import english_of, texts_of_page, watch_pictures
+from tests.support.left_english import assert_chinese, texts_of_page, watch_pictures
 from tests.support.places import Place, Told, poolcal
 from tests.support.planted_runs import planted
 
@@ -27,11 +27,6 @@ def drawn(run: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return texts_of_page(run / "report" / "report.html") + (pictures if fonts_of("zh") else [])
 
 
-def assert_chinese(texts: list[str], *data: object) -> None:
-    left = list(english_of(texts, [*NAMES, *map(str, data)]))
-    assert not left, "\n".join(f"[{words}] {text}" for text, words in left)
-
-
 def screen(told: Told) -> list[str]:
     return [*told.out.splitlines(), *told.complaints]
 
@@ -39,20 +34,20 @@ def screen(told: Told) -> list[str]:
 def test_an_accepted_run(done: Place, monkeypatch: pytest.MonkeyPatch) -> None:
     told = poolcal(*done.words())
     assert told.status == 0
-    assert_chinese(screen(told) + drawn(done.run, monkeypatch), done.folder)
+    assert_chinese(screen(told) + drawn(done.run, monkeypatch), done.folder, *NAMES)
 
 
 def test_a_rejected_run(done: Place, monkeypatch: pytest.MonkeyPatch) -> None:
     done.edit_config("verdict", max_sigma_deg=1e-6)
     told = done.calibrate()
     assert told.status == 1
-    assert_chinese(screen(told) + drawn(done.run, monkeypatch), done.folder)
+    assert_chinese(screen(told) + drawn(done.run, monkeypatch), done.folder, *NAMES)
 
 
 def test_a_laser_run(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
     told = poolcal("laser", *place.words()[1:], "--no-report", "--no-recordings", "--no-write")
     assert told.status in (0, 1), told.err
-    assert_chinese(screen(told) + drawn(place.run, monkeypatch), place.folder)
+    assert_chinese(screen(told) + drawn(place.run, monkeypatch), place.folder, *NAMES)
 
 
 def test_a_check_with_findings(place: Place) -> None:
@@ -60,7 +55,7 @@ def test_a_check_with_findings(place: Place) -> None:
     place.edit_session("laser", gps_week=2400)
     told = poolcal("check", place.session, "--config", place.config)
     assert told.status == 1, told.err
-    assert_chinese(screen(told), place.folder)
+    assert_chinese(screen(told), place.folder, *NAMES)
 
 
 def test_two_runs_and_many(done: Place, undisturbed: tuple[Path, Told], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -76,4 +71,4 @@ def test_two_runs_and_many(done: Place, undisturbed: tuple[Path, Told], monkeypa
     texts = screen(poolcal("diff", before, done.run, "--html", page))
     texts += screen(poolcal("history", folder)) + texts_of_page(folder / "history" / "history.html")
     texts += texts_of_page(page) + (pictures if fonts_of("zh") else [])
-    assert_chinese(texts, done.folder, "run1", "run2", "run3", "run4", "refused")
+    assert_chinese(texts, done.folder, *NAMES, "run1", "run2", "run3", "run4", "refused")

@@ -115,3 +115,9 @@ def english_of(texts: Iterable[str], data: Iterable[str] = ()) -> Iterator[tuple
         words = [word for word in ENGLISH.findall(KEYS.sub(" ", rest)) if word not in WORDS]
         if words:
             yield text, " ".join(words)
+
+
+def assert_chinese(texts: Iterable[str], *data: object) -> None:
+    """Assert that no text has English words, beside names that the session gives."""
+    left = list(english_of(texts, map(str, data)))
+    assert not left, "\n".join(f"[{words}] {text}" for text, words in left)
