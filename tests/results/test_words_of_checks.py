@@ -61,23 +61,50 @@ def _figures(**changes: tuple[float, float]) -> pd.DataFrame:
 
 def test_a_smaller_and_slower_drift_is_all_right() -> None:
     figures = _figures(horizontal_m=(0.0015, -3.0), time_constant_s=(5650.0, 3.0))
-    words = drift_sentence(figures)
+    words = drift_sentence(figures, ["geometry_gap"])
     assert "its errors of position are 0.10 times as large" in words
-    assert "those of attitude about as large" in words
+    assert "its errors of attitude are about as large" in words
     assert "and the time over which they change 28 times as large" in words
     assert "That is all right" in words
     assert [row["unit"] for row in drift_rows(figures)] == ["m", "m", "°", "°", "s"]
 
 
-def test_a_larger_or_a_faster_drift_is_not() -> None:
-    for change in ({"horizontal_m": (0.15, 3.0)}, {"time_constant_s": (10.0, -3.0)}):
-        words = drift_sentence(_figures(**change))
-        assert "see the warnings" in words
-        assert "all right" not in words
+@pytest.mark.parametrize(
+    "code", ["ins_drift_above_settings", "ins_drift_off_figures", "ins_drift_between_passes"]
+)
+def test_the_sentence_says_what_the_verdict_says(code: str) -> None:
+    """A drift three times as far: within the factors of the figures, and yet a warning or a reason."""
+    words = drift_sentence(_figures(horizontal_m=(0.04, 1.4)), [code])
+    assert "see the reasons and warnings" in words
+    assert "all right" not in words
+
+
+@pytest.mark.parametrize(
+    ("change", "more"),
+    [
+        ({"horizontal_m": (0.0185, 0.3)}, False),
+        ({"horizontal_m": (0.019, 0.4)}, True),
+        ({"roll_pitch_deg": (0.02, 1.0)}, True),
+        ({"time_constant_s": (170.0, -0.1)}, False),
+        ({"time_constant_s": (150.0, -0.3)}, True),
+        ({"time_constant_s": (900.0, 1.4)}, False),
+    ],
+)
+def test_a_somewhat_larger_or_faster_drift_is_told_as_such(change: dict[str, tuple[float, float]], more: bool) -> None:
+    words = drift_sentence(_figures(**change), [])
+    assert ("more, or faster, than they say" in words, "all right" in words) == (more, not more)
+
+
+def test_a_figure_of_zero_leaves_the_sentence_whole() -> None:
+    figures = _figures(vertical_m=(0.01, -1.0))
+    figures.loc[figures["figure"] == "horizontal_m", ["configured", "estimated"]] = 0.0
+    assert "figures, its errors of position are 0.50 times as large, its" in drift_sentence(figures, [])
+    figures.loc[figures["figure"] == "vertical_m", ["configured", "estimated"]] = 0.0
+    assert "figures, its errors of attitude are about" in drift_sentence(figures, [])
 
 
 def test_an_exact_drift_says_nothing() -> None:
-    assert drift_sentence(drift_figures().assign(sigma_log=0.0)) == ""
+    assert drift_sentence(drift_figures().assign(sigma_log=0.0), []) == ""
 
 
 # --- the faces -------------------------------------------------------------------------------------------------------

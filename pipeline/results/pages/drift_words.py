@@ -1,13 +1,31 @@
 """What the drift of the INS by the data means against its configured figures, in words for the report."""
 
+from collections.abc import Collection
 from typing import Any
 
 import pandas as pd
 
-from pipeline.report.drift_check import figures_disagree
+from pipeline.report.reason_codes import ReasonCode
 
 UNIT = {"m": "m", "deg": "°", "s": "s"}
 NEAR = 1.25  # factor within which a figure counts as the same
+FIGURES = {
+    "shifts": ("horizontal_m", "vertical_m"),
+    "turns": ("roll_pitch_deg", "heading_deg"),
+    "time": ("time_constant_s",),
+}
+WORDS = {
+    "shifts": "its errors of position are",
+    "turns": "its errors of attitude are",
+    "time": "and the time over which they change",
+}
+TOO_FAR = frozenset(
+    {
+        ReasonCode.INS_DRIFT_ABOVE_SETTINGS,
+        ReasonCode.INS_DRIFT_OFF_FIGURES,
+        ReasonCode.INS_DRIFT_BETWEEN_PASSES,
+    }
+)
 
 
 def drift_rows(figures: pd.DataFrame) -> list[dict[str, Any]]:
@@ -21,29 +39,29 @@ def drift_rows(figures: pd.DataFrame) -> list[dict[str, Any]]:
     return [row | {"unit": UNIT[row["figure"].rpartition("_")[2]]} for row in _estimated(figures)]
 
 
-def drift_sentence(figures: pd.DataFrame) -> str:
+def drift_sentence(figures: pd.DataFrame, codes: Collection[str]) -> str:
     """Return sentences on how the estimated drift compares with the configured one, and whether that is all right.
+
+    Shifts have one factor in common, and turns another; it is told by the first of their figures that is not zero.
 
     Parameters
     ----------
     figures
         The table ``drift_figures``.
+    codes
+        Codes of all reasons and warnings of the run: what they say of the drift, the sentence says too.
     """
     ratios = {row["figure"]: row["estimated"] / row["configured"] for row in _estimated(figures) if row["configured"]}
-    parts = [
-        f"{words} {_times(ratios[name])}"
-        for name, words in (
-            ("horizontal_m", "its errors of position are"),
-            ("roll_pitch_deg", "those of attitude"),
-            ("time_constant_s", "and the time over which they change"),
-        )
-        if name in ratios
-    ]
+    found = {kind: [ratios[name] for name in names if name in ratios] for kind, names in FIGURES.items()}
+    parts = [f"{WORDS[kind]} {_times(of_kind[0])}" for kind, of_kind in found.items() if of_kind]
     if not parts:
         return ""
     compared = f"Against the configured figures, {', '.join(parts)}."
-    if figures_disagree(figures) is not None:
-        return f"{compared} That is more than the figures allow: see the warnings."
+    if TOO_FAR.intersection(codes):
+        return f"{compared} The INS drifts farther, or faster, than they allow: see the reasons and warnings at the top."
+    shorter = [1 / ratio for ratio in found["time"]]
+    if max([ratio for kind in ("shifts", "turns") for ratio in found[kind]] + shorter) >= NEAR:
+        return f"{compared} That is more, or faster, than they say, but within the factors of ins.drift_within."
     return (
         f"{compared} That is all right: the INS drifted no more and no faster than its figures allow. Smaller errors, "
         "or slower ones, only mean that it did better in these minutes; a long time constant says that its errors "
