@@ -62,7 +62,7 @@ def test_an_accepted_run_has_a_certificate(undisturbed: tuple[Path, Told]) -> No
         assert float(half) == pytest.approx(half_width, abs=5.1e-4 if angle else 0.051)
     assert [row[0] for row in page.table("", "name", "date")] == ["evaluated by", "approved by"]
     assert "poolcal is not yet proven on a real calibration" in text
-    speed = re.search(r"They were found at ([\d.]+) m/s \(([\d.]+) kn\)", text)
+    speed = re.search(r"The values were found at ([\d.]+) m/s \(([\d.]+) kn\)", text)
     assert speed is not None
     assert float(speed[1]) == pytest.approx(0.4, abs=0.051)
     assert float(speed[2]) == pytest.approx(0.4 / 0.5144, abs=0.051)
@@ -149,6 +149,23 @@ def test_a_rejected_run_is_marked_and_has_no_line_to_sign(done: Place) -> None:
     classes = [attributes.get("class") or "" for attributes in page.named("table")]
     assert "whole values quiet" in classes
     assert not any("signatures" in one for one in classes)
+    assert "This run is rejected: the uncertainties on this sheet" in text
+    for promise in ("The values hold until", "the mount takes at most", "before you rely on", "they replace the coarse"):
+        assert promise not in text
+
+
+def test_words_of_the_crew_stay_as_they_are_in_another_language(done: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A vessel may be called by a word of the catalogue."""
+    monkeypatch.setenv("POOLCAL_LANG", "zh")
+    words = {"make": "sonar", "model": "up", "serial": "forward", "firmware": "accepted", "remarks": "pool"}
+    about = {"vessel": "pool", "surveyor": "roll", "approved_by": "yaw", "instruments": {"mbes": words}}
+    done.edit_session("", name="laser", about=about)
+    assert done.calibrate("--report").status == 0
+    page = Page(html_of(done.run))
+    assert page.headings[0] == "laser"
+    assert "船名 pool" in " ".join(page.text.split())
+    assert ["声呐", "sonar up; pool", "forward", "accepted"] in page.table("仪器")
+    assert [row[1] for row in page.table("", "名称", "日期")] == ["roll", "yaw"]
 
 
 def test_without_a_solution_there_are_dashes(small: Path, tmp_path: Path) -> None:

@@ -69,9 +69,7 @@ def test_a_smaller_and_slower_drift_is_all_right() -> None:
     assert [row["unit"] for row in drift_rows(figures)] == ["m", "m", "°", "°", "s"]
 
 
-@pytest.mark.parametrize(
-    "code", ["ins_drift_above_settings", "ins_drift_off_figures", "ins_drift_between_passes"]
-)
+@pytest.mark.parametrize("code", ["ins_drift_above_settings", "ins_drift_off_figures", "ins_drift_between_passes"])
 def test_the_sentence_says_what_the_verdict_says(code: str) -> None:
     """A drift three times as far: within the factors of the figures, and yet a warning or a reason."""
     words = drift_sentence(_figures(horizontal_m=(0.04, 1.4)), [code])

@@ -58,7 +58,9 @@ def drift_sentence(figures: pd.DataFrame, codes: Collection[str]) -> str:
         return ""
     compared = f"Against the configured figures, {', '.join(parts)}."
     if TOO_FAR.intersection(codes):
-        return f"{compared} The INS drifts farther, or faster, than they allow: see the reasons and warnings at the top."
+        return (
+            f"{compared} The INS drifts farther, or faster, than they allow: see the reasons and warnings at the top."
+        )
     shorter = [1 / ratio for ratio in found["time"]]
     if max([ratio for kind in ("shifts", "turns") for ratio in found[kind]] + shorter) >= NEAR:
         return f"{compared} That is more, or faster, than they say, but within the factors of ins.drift_within."
