@@ -150,7 +150,7 @@ def test_a_rejected_run_is_marked_and_has_no_line_to_sign(done: Place) -> None:
     assert "whole values quiet" in classes
     assert not any("signatures" in one for one in classes)
     assert "This run is rejected: the uncertainties on this sheet" in text
-    for promise in ("The values hold until", "the mount takes at most", "before you rely on", "they replace the coarse"):
+    for promise in ("The values hold until", "the mount takes at most", "before you rely on", "they replace"):
         assert promise not in text
 
 

@@ -80,7 +80,7 @@ def _svg(view: View, mount: Mounted, sonar: bool) -> Markup:
     scale = REACH / max(1.0, float(np.abs(mount.lever_arm_body_m).max()))
     sensor = _flat(view, scale * mount.lever_arm_body_m)
     shapes = [f'<polygon points="{_points(view.outline)}" fill="#eef1f4" stroke="{QUIET}"/>']
-    for axis, beside in ((view.right, (-3, 17)), (view.up, (17, 4))):  # names clear of outlines and curved arrows
+    for axis, beside in ((view.right, (-3, 17)), (view.up, (16, 12))):  # names clear of outlines and curved arrows
         end = _flat(view, 54.0 * np.eye(3)[axis])
         shapes += _arrow([np.zeros(2), end], INK, 1.2)
         shapes.append(_letter(f"{LETTERS[axis]} +", end + beside, INK))
