@@ -12,7 +12,7 @@ from pipeline.results.pages.assumptions import assumed_groups
 from pipeline.results.pages.instrument_table import instrument_rows
 from pipeline.results.pages.rendering import render_page
 from pipeline.run.assumed_drift import assumed_drift
-from pipeline.run.origins import is_recorded
+from pipeline.run.origins import is_recorded, origin_of
 from pipeline.run.settings import Settings, read_settings, write_settings
 from tests.support.pages import Page
 from tests.support.preset_sessions import FOREIGN, MOUNT, session
@@ -79,6 +79,7 @@ def test_an_older_run_does_not_claim_to_know(tmp_path: Path) -> None:
     origins = {row[2]: row[4] for row in _shown(older)[9:]}
     assert origins["angle_sigma_deg"] == "default, or the same in the file"
     assert [row[4] for row in _shown(older) if row[3] == "0.006"] == ["session"]
+    assert origin_of(older, "target.faces.quay.1.corners", changed=True) == "pool"  # names of faces may have dots
     assert list(assumed_groups(older, ())) == []
     assert not is_recorded(older)
 

@@ -63,7 +63,10 @@ def drift_sentence(figures: pd.DataFrame, codes: Collection[str]) -> str:
         )
     shorter = [1 / ratio for ratio in found["time"]]
     if max([ratio for kind in ("shifts", "turns") for ratio in found[kind]] + shorter) >= NEAR:
-        return f"{compared} That is more, or faster, than they say, but within the factors of ins.drift_within."
+        return (
+            f"{compared} That is more, or faster, than they say, but within the factors of ins.drift_within: the "
+            "sigmas count with it."
+        )
     return (
         f"{compared} That is all right: the INS drifted no more and no faster than its figures allow. Smaller errors, "
         "or slower ones, only mean that it did better in these minutes; a long time constant says that its errors "

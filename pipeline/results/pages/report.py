@@ -226,7 +226,7 @@ def _origin(settings: Settings, key: str) -> str:
 
     A list of blocks, or a block whose keys are free names, is given as a whole.
     """
-    origin = origin_of(settings, key)
+    origin = origin_of(settings, key, changed=True)
     if origin != DEFAULT:
         return origin
     stated = [one for keys in settings.stated.values() for one in keys]

@@ -22,7 +22,7 @@ LETTERS = "xyz"
 REACH = 62.0  # length of the longest part of a lever arm, in units of the drawing; the view is 200 wide and 200 high
 RADIUS, TURN_DEG = 82.0, 40.0  # of the curved arrows
 LOOK = 30.0  # length of the line along which the sonar looks
-PROW = ((-34, 66), (34, 66), (34, -50), (0, -84), (-34, -50))
+PROW = ((-30, 66), (30, 66), (30, -50), (0, -84), (-30, -50))
 
 
 @dataclass(frozen=True)
