@@ -8,6 +8,7 @@ from pipeline.config.target import Letters, Origin
 from pipeline.language import chosen
 from pipeline.maths.target.face import Face
 from pipeline.maths.target.family_words import families_in_words
+from pipeline.maths.target.model import Family, TargetModel
 from pipeline.results.pages.drift_words import drift_rows, drift_sentence
 from pipeline.results.pages.patent_check import patent_check
 from pipeline.target.design import target_of
@@ -116,6 +117,15 @@ def test_the_patent_s_target_is_told_as_the_boat_sees_it() -> None:
     assert words.endswith("faces, horizontal (tops and bottoms)")
     north = [face for face in model.faces if face.family == "P3"]  # an own look at the sign: P3 stands at y > 0
     assert all(isinstance(face, Face) and np.min(np.asarray(face.vertices_m)[:, 1]) > 0 for face in north)
+
+
+def test_a_face_that_leans_is_told_to() -> None:
+    """A slipway rises away from the boat, and looks up at it; an overhang looks down."""
+    slip = Family("slip", np.array([-0.8, 0.0, 0.6]), 0.0, (0,), True)
+    overhang = Family("overhang", np.array([-0.5, -0.5, -np.sqrt(0.5)]), 0.0, (1, 2), True)
+    words = families_in_words(TargetModel((), (slip, overhang), (), 0.0, None))
+    assert "slip: 1 face straight towards the boat, looking up by 37°; " in words
+    assert words.endswith("overhang: 2 faces turned 45° astern (-y), looking down by 45°")
 
 
 # --- the screen ------------------------------------------------------------------------------------------------------
