@@ -176,7 +176,10 @@ def test_without_a_solution_there_are_dashes(small: Path, tmp_path: Path) -> Non
     assert [row[2:] for row in page.table("value", "positive")] == [["–", "–"]] * 6
     text = " ".join(page.text.split())
     assert "There is no solution, and so no uncertainty." in text
-    assert "What it means for soundings" not in text
+    for nothing in ("What it means for soundings", "Assumed, not stated", "were found at", "The uncertainties"):
+        assert nothing not in text
+    untold = text[text.index("The points tell nothing of: ") :].partition(". ")[0].split("; ")
+    assert len({*untold}) == len(untold)
     assert not re.search(r"\bnan\b", text.lower())
 
 
