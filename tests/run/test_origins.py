@@ -115,7 +115,7 @@ def test_of_the_drift_each_figure_that_no_file_gave_is_named(tmp_path: Path) -> 
 def _of_laser(folder: Path, **laser: Any) -> Settings:
     """A session without a sonar, in a pool whose config states nothing."""
     settings = _settings(folder, session(folder, laser=laser).model_copy(update={"mbes": None}))
-    return replace(settings, stated=settings.stated | {"config": ()})
+    return replace(settings, stated={**settings.stated, "config": ()})
 
 
 def test_what_the_laser_s_own_calibration_assumes(tmp_path: Path) -> None:
