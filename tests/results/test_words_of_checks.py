@@ -65,7 +65,7 @@ def test_a_smaller_and_slower_drift_is_all_right() -> None:
     words = drift_sentence(figures, ["geometry_gap"])
     assert "its errors of position are 0.10 times as large" in words
     assert "its errors of attitude are about as large" in words
-    assert "and the time over which they change 28 times as large" in words
+    assert "and the time over which they change is 28 times as long" in words
     assert "That is all right" in words
     assert [row["unit"] for row in drift_rows(figures)] == ["m", "m", "°", "°", "s"]
 
@@ -100,6 +100,12 @@ def test_a_figure_of_zero_leaves_the_sentence_whole() -> None:
     assert "figures, its errors of position are 0.50 times as large, its" in drift_sentence(figures, [])
     figures.loc[figures["figure"] == "vertical_m", ["configured", "estimated"]] = 0.0
     assert "figures, its errors of attitude are about" in drift_sentence(figures, [])
+
+
+def test_the_sentence_has_its_order_in_chinese_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("POOLCAL_LANG", "zh")
+    words = chosen.translated(drift_sentence(_figures(horizontal_m=(0.0015, -3.0)), []))
+    assert words.startswith("与设置的数值相比，其位置误差为 0.10 倍，其姿态误差大小相当，其变化所经历的时间相当。")
 
 
 def test_an_exact_drift_says_nothing() -> None:

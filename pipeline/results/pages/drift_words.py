@@ -14,10 +14,13 @@ FIGURES = {
     "turns": ("roll_pitch_deg", "heading_deg"),
     "time": ("time_constant_s",),
 }
-WORDS = {
-    "shifts": "its errors of position are",
-    "turns": "its errors of attitude are",
-    "time": "and the time over which they change",
+WORDS = {  # where the estimate is another one, and where it is about the same
+    "shifts": ("its errors of position are {} times as large", "its errors of position are about as large"),
+    "turns": ("its errors of attitude are {} times as large", "its errors of attitude are about as large"),
+    "time": (
+        "and the time over which they change is {} times as long",
+        "and the time over which they change is about as long",
+    ),
 }
 TOO_FAR = frozenset(
     {
@@ -53,7 +56,7 @@ def drift_sentence(figures: pd.DataFrame, codes: Collection[str]) -> str:
     """
     ratios = {row["figure"]: row["estimated"] / row["configured"] for row in _estimated(figures) if row["configured"]}
     found = {kind: [ratios[name] for name in names if name in ratios] for kind, names in FIGURES.items()}
-    parts = [f"{WORDS[kind]} {_times(of_kind[0])}" for kind, of_kind in found.items() if of_kind]
+    parts = [_compared(*WORDS[kind], of_kind[0]) for kind, of_kind in found.items() if of_kind]
     if not parts:
         return ""
     compared = f"Against the configured figures, {', '.join(parts)}."
@@ -79,12 +82,12 @@ def _estimated(figures: pd.DataFrame) -> list[dict[str, Any]]:
     return [row for row in rows if row["sigma_log"]]
 
 
-def _times(ratio: float) -> str:
+def _compared(other: str, same: str, ratio: float) -> str:
     """Return a ratio in words.
 
-    >>> _times(0.1), _times(27.2), _times(1.1)
-    ('0.10 times as large', '27 times as large', 'about as large')
+    >>> [_compared("{} times", "the same", ratio) for ratio in (0.1, 27.2, 1.1)]
+    ['0.10 times', '27 times', 'the same']
     """
     if 1 / NEAR < ratio < NEAR:
-        return "about as large"
-    return f"{ratio:.2g} times as large" if ratio >= 1 else f"{ratio:.2f} times as large"
+        return same
+    return other.format(f"{ratio:.2g}" if ratio >= 1 else f"{ratio:.2f}")
