@@ -8,11 +8,13 @@ from scipy.stats import norm
 
 from pipeline.adjustment.parameter_strengths import SETS
 from pipeline.config.session import Drift
+from pipeline.language.chosen import translated
 from pipeline.report.cause_words import WORDS_OF_SETS
 from pipeline.report.drift_check import check_ins_drift
 from pipeline.report.reason_codes import ReasonCode
 from pipeline.report.verdict import explanations, rejections
 from tests.support.evidence import ADJUSTED, PASS_3, codes, drift, evidence, freed_table, judged, methods
+from tests.support.left_english import english_of
 
 ONE = {"sigma": 1e-4, "expected": 1e-4}
 
@@ -56,6 +58,18 @@ def test_a_cause_within_two_sigmas_of_the_first_is_named_beside_it(value, is_nam
     nearly = "longer; nearly as well (strength 18): the laser's ranges: they should be +1.8 ± 0.1 mm"
     assert (nearly in words) == is_named
     assert words.endswith(f"; {'1 other cause' if is_named else '2 other causes'} would explain it less well")
+
+
+@pytest.mark.parametrize("number", [1, 2, 3])
+@pytest.mark.parametrize("further", [{}, {"by_session": 30.0}])
+def test_a_cause_is_in_chinese_whatever_stands_behind_it(monkeypatch, number, further):
+    one = {"expected": 1e-4, "sigma": 1e-4} | further
+    values = (("mbes_latency", 0.002), ("laser_range", 0.0019), ("mbes_level_range", 0.001))
+    freed = freed_table(*(one | {"unknown": name, "value": value} for name, value in values[:number]))
+    (reason,) = judged(replace(evidence(), freed=freed))
+    assert ("larger drift" in reason.words) == bool(further)
+    monkeypatch.setenv("POOLCAL_LANG", "zh")
+    assert not list(english_of([translated(reason.words)])), translated(reason.words)
 
 
 def test_a_known_error_is_as_strong_as_its_prior_information_lets_it_be():
