@@ -36,7 +36,6 @@ from typing import Any
 import pandas as pd
 
 from pipeline.config.pool import Method, VerdictLimits
-from pipeline.console import plural
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.report.ambiguities import MountSearch, ambiguities
 from pipeline.report.coarse_mount import contradicted_coarse_mount
@@ -195,7 +194,7 @@ def _suspected_cause(causes: list[SuspectedCause], is_second: bool) -> list[Stat
         strength = f"{strength}; a larger drift of the INS would explain less"
     parts = [f"likely cause of residuals{unless} (strength {strength}): {first.words}"]
     parts += [f"nearly as well (strength {cause.strength:.0f}): {cause.words}" for cause in rivals]
-    parts += [f"{plural(others, 'other cause')} would explain it less well"] if others else []
+    parts += [f"other causes that would explain it less well: {others}"] if others else []
     return [Statement(ReasonCode.SUSPECTED_CAUSE, "; ".join(parts))]
 
 
