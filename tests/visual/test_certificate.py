@@ -19,6 +19,7 @@ FULL: dict[str, Any] = {
     "weather": "overcast, wind 2 m/s", "water_temperature": "17.4 °C at 1 m", "datum": "CGCS2000", "epoch": "2026.36",
     "ins_reference_point": "centre of the IMU's housing", "laser_calibration": "certificate C-2201 of 2026-02-03",
     "target_survey": "total station, 2026-04-28, sheet 3", "sound_speed": "cast at 07:50 UTC",
+    "remarks": "trial before the harbour survey; the second pass was sailed twice because of a passing tug",
     "instruments": {
         sensor: {"make": "Example", "model": "One 2000", "serial": "NMND21340012L", "firmware": "OM7MR0810"}
         for sensor in ("ins", "laser", "mbes", "sound_speed_probe")
