@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.artefacts.streams import BATCH_ROWS
-from pipeline.console import plural
 from pipeline.entry_check.fingerprints import FilePoints
 from pipeline.entry_check.placing import GEOGRAPHIC, Placing, guessed, hints, placing_of
 from pipeline.entry_check.run_soundings import RunSide
@@ -170,7 +169,7 @@ def _elsewhere(path: Path, placing: Placing, coordinates: Array, count: int, sid
     away = _nearest_m(placing, coordinates, side)
     if away < side.soundings.reach_m + MARGIN_M:
         return (
-            f"{path}: only {plural(count, 'sounding')} near the run's track, and {LEAST_POINTS} are the least; "
+            f"{path}: too few soundings lie near the run's track ({count}; {LEAST_POINTS} are needed); "
             "export whole passes"
         )
     says = f"{path}: {count or 'no'} soundings lie near the run's track in {placing.name} ({placing.title})"

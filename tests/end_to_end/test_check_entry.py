@@ -214,7 +214,7 @@ def test_another_zone_is_named_and_swapped_axes_are_read(
     assert told.status == 2
     assert "m from the target; is it another datum, another CRS, or another session?" in told.err
     write_points(file, in_crs(placed, UTM)[:59], 3)
-    assert "only 59 soundings near the run's track" in poolcal("check-entry", run, file).err
+    assert "too few soundings lie near the run's track (59; 60 are needed)" in poolcal("check-entry", run, file).err
     write_points(file, in_crs(placed, UTM)[:, [1, 0, 2]], 3)
     status, found = asked(run, file, "--crs", UTM)
     assert status == 0

@@ -62,7 +62,7 @@ def test_one_window_gives_its_whole_ping_but_for_beams_beyond_a_gap(reverse: boo
 
 def test_passes_in_another_order_are_all_found() -> None:
     run = np.arange(900)
-    file = np.concatenate([np.arange(600, 900), np.arange(300, 600), np.arange(300)])  # places of the passes in the file
+    file = np.concatenate([np.arange(600, 900), np.arange(300, 600), np.arange(300)])  # where its three passes stand
     found = in_order(Windows(run[:, None] + np.arange(5), file[:, None] + np.arange(5), 1))
     assert found is not None
     assert sorted(found.run_rows[:, 0].tolist()) == run.tolist()
