@@ -15,7 +15,7 @@ from pipeline.errors import RawDataError
 from pipeline.readers.crs import DEGREE_M
 from pipeline.readers.detect import kind_of
 from pipeline.readers.exported import text_layout, text_points
-from pipeline.readers.file_kind import CSV, FLOAT32_TEXT, GSF, LAS, TEXT, TRAJECTORY_TEXT
+from pipeline.readers.file_kind import GSF, LAS
 from pipeline.readers.gsf_places import POSITION_STEP_M, gsf_points
 from pipeline.readers.las import crs_of_las, las_points
 from pipeline.readers.las_header import read_header
@@ -31,7 +31,6 @@ MARGIN_M = 10.0  # by how much a lever arm may be wrong
 LEAST_POINTS = 60
 COARSEST_M = 0.1
 GRID_STEP_M, GRID_ROUNDING = 0.04, 0.1  # least cell of a grid; of multiples of the cell, as a share of it
-TEXTS = (CSV, TEXT, FLOAT32_TEXT, TRAJECTORY_TEXT)
 
 
 @dataclass(frozen=True)
@@ -168,6 +167,11 @@ def _nearest_m(placing: Placing, coordinates: Array, side: RunSide) -> float:
 def _elsewhere(path: Path, placing: Placing, coordinates: Array, count: int, side: RunSide) -> str:
     """Return the message that the points lie elsewhere, and in which CRS they would lie at the target."""
     away = _nearest_m(placing, coordinates, side)
+    if away < side.soundings.reach_m + MARGIN_M:
+        return (
+            f"{path}: too few soundings lie near the run's track ({count}; {LEAST_POINTS} are needed); "
+            "export whole passes"
+        )
     says = f"{path}: {count or 'no'} soundings lie near the run's track in {placing.name} ({placing.title})"
     found = hints(coordinates, side, 500.0)
     if found:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.console import plural, signed
-from pipeline.entry_check.answer import Answer
+from pipeline.entry_check.answer import EVEN, Answer
 from pipeline.entry_check.check import EntryCheck
 from pipeline.entry_check.explanations import PART_NAMES, Explanation
 from pipeline.entry_check.judging import TOLERANCE_DEG, TOLERANCE_M
@@ -20,6 +20,7 @@ from pipeline.text_table import text_table
 WIDTH = 100
 BULLET = "  - "
 COARSE_M = 0.002
+TELLS_DEG, TELLS_M = 5.0, 0.5  # beyond, an answer excludes nothing that anybody would enter
 SHOWN_EXCESS_M = 0.002  # a smaller scatter beyond rounding is not worth a word
 
 
@@ -74,8 +75,8 @@ def _answer(check: EntryCheck) -> Iterator[str]:
     if answer.excess_m > SHOWN_EXCESS_M:
         yield (
             f"The soundings scatter by {1000 * answer.excess_m:.0f} mm beyond rounding. The software traces rays "
-            "otherwise (another sound speed or cast), it has other positions or attitudes than the run, or its "
-            "soundings were smoothed."
+            "otherwise (another sound speed or cast), it has other positions or attitudes than the run, its soundings "
+            "were smoothed, or not all were placed with the same mount."
         )
 
 
@@ -89,13 +90,23 @@ def _uncertain(check: EntryCheck) -> Iterator[str]:
     answer = check.answer
     most_deg = answer.angle_deg + answer.angle_limit_deg
     most_m = float((np.abs(answer.lever_m) + answer.lever_limit_m)[: 2 if answer.way.any_height else 3].max())
-    yield (
-        "Cannot be told closely enough: the calibrated mount explains the soundings, but so does any other within "
-        f"{most_deg:.3f}° and {most_m:.3f} m. A larger mistake is excluded."
-    )
+    if check.pairs.evenness < EVEN:
+        yield "Cannot be told: the calibrated mount explains the soundings that were found, but not all were."
+    elif most_deg > TELLS_DEG or most_m > TELLS_M:
+        yield "Cannot be told: the soundings that were found are too few, or scatter too much."
+    else:
+        yield (
+            "Cannot be told closely enough: the calibrated mount explains the soundings, but so does any other within "
+            f"{most_deg:.3f}° and {most_m:.3f} m. A larger mistake is excluded."
+        )
     if answer.explanations[0].words:
         yield f"Besides: {_joined(answer.explanations[0])}."
-    if check.file.points.rounding_m > COARSE_M:
+    if check.pairs.evenness < EVEN:
+        yield (
+            "Of some passes hardly any sounding was found: they are missing in the file, or another mount placed them. "
+            "Export all in the order of time."
+        )
+    elif check.file.points.rounding_m > COARSE_M:
         yield "The file rounds its places to a centimetre or more: export text with 3 decimals."
     elif answer.excess_m <= SHOWN_EXCESS_M:
         yield "Export more soundings, of all passes."

@@ -157,6 +157,16 @@ def test_parts_of_the_soundings_will_do(
     assert found["explanations"][0]["codes"][0] == "sign_yaw"
 
 
+def test_lines_with_other_values_are_no_right_entry(
+    run: Path, recorded: Recording, right: Entry, tmp_path: Path
+) -> None:
+    file, placed, late = tmp_path / "a.xyz", georeferenced(recorded, right), recorded.t_ns > np.median(recorded.t_ns)
+    other = georeferenced(recorded, replace(right, angles_deg=tuple(np.add(right.angles_deg, 0.8))))
+    write_points(file, in_crs(np.where(late[:, None], other, placed), UTM), 3)
+    assert asked(run, file)[0] == 1
+    assert "or not all were placed with the same mount" in " ".join(poolcal("check-entry", run, file).out.split())
+
+
 def test_heights_of_another_surface(run: Path, recorded: Recording, right: Entry, tmp_path: Path) -> None:
     file = tmp_path / "a.csv"
     points = in_crs(georeferenced(recorded, right), UTM, lift_m=-8.312)
@@ -203,6 +213,8 @@ def test_another_zone_is_named_and_swapped_axes_are_read(
     told = poolcal("check-entry", run, file, "--crs", UTM)
     assert told.status == 2
     assert "m from the target; is it another datum, another CRS, or another session?" in told.err
+    write_points(file, in_crs(placed, UTM)[:59], 3)
+    assert "too few soundings lie near the run's track (59; 60 are needed)" in poolcal("check-entry", run, file).err
     write_points(file, in_crs(placed, UTM)[:, [1, 0, 2]], 3)
     status, found = asked(run, file, "--crs", UTM)
     assert status == 0

@@ -16,10 +16,11 @@ RIGHT_R = rotation(ANGLES)
 
 
 def answer(
-    points: np.ndarray, source: EntrySource = SOURCE, heights_differ: bool = False, noise_m: float = 3e-4
-) -> Answer:
+    points: np.ndarray, source: EntrySource = SOURCE, heights_differ: bool = False, noise_m: float = 3e-4,
+    boat: Boat = BOAT, evenness: float = 1.0,
+) -> Answer:  # fmt: skip
     points = points + np.random.default_rng(5).normal(0, noise_m, points.shape)
-    pairs = Pairs(BOAT.soundings, points, len(points), 1.0, 0.0, False, "order")
+    pairs = Pairs(boat.soundings, points, len(points), 1.0, 0.0, False, "order", evenness=evenness)
     return answer_of(pairs, source, heights_differ, 0.0005)
 
 
@@ -134,3 +135,31 @@ def test_other_positions_in_each_pass_hide_a_centimetre_but_no_sign(R: np.ndarra
 
 def test_too_few_or_too_rough_soundings_cannot_tell() -> None:
     assert answer(BOAT.placed(RIGHT_R, LEVER), noise_m=1.0).verdict == "uncertain"
+
+
+@pytest.mark.parametrize("passes", [1, 2])
+def test_a_pass_with_the_old_values_is_not_passed_over(passes: int) -> None:
+    """The right mount explains most of the soundings exactly; the others were placed with the coarse one."""
+    old = np.arange(len(BOAT.x_mbes)) < passes * len(BOAT.x_mbes) // 4
+    found = answer(np.where(old[:, None], BOAT.placed(rotation(COARSE), COARSE_LEVER), BOAT.placed(RIGHT_R, LEVER)))
+    assert not found.is_right
+    assert found.excess_m > 0.02
+
+
+def test_outliers_are_no_second_mount() -> None:
+    points, random = BOAT.placed(RIGHT_R, LEVER), np.random.default_rng(2)
+    bad = random.random(len(points)) < 0.1
+    points[bad] += random.normal(0, 0.5, (bad.sum(), 3))
+    assert answer(points).is_right
+
+
+@pytest.mark.parametrize(("evenness", "expected"), [(0.6, "right"), (0.3, "uncertain")])
+def test_passes_that_were_not_found_may_lie_elsewhere(evenness: float, expected: str) -> None:
+    assert answer(BOAT.placed(RIGHT_R, LEVER), evenness=evenness).verdict == expected
+
+
+@pytest.mark.parametrize(("rolling", "expected"), [(1.0, "right"), (0.001, "uncertain")])
+def test_without_roll_and_pitch_no_z_is_proved_below_any_heights(rolling: float, expected: str) -> None:
+    boat = Boat((0.0, 0.0, 0.0, 0.0), rolling=rolling)
+    found = answer(boat.placed(RIGHT_R, LEVER) + np.array([0, 0, -8.3]), heights_differ=True, boat=boat)
+    assert found.verdict == expected
