@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from pipeline.entry_check.ways import Way
 from pipeline.maths.geometry.rotations import rotation_error
+from pipeline.mount import Mounted
 
 Array = NDArray[np.float64]
 TOLERANCE_DEG, TOLERANCE_M = 0.01, 0.005
@@ -40,6 +41,11 @@ class Judge:
         sigma = np.sqrt(np.diag(way.fitted.covariance))
         angles = SIGMAS * sigma[:3] + HIDDEN * excess_m / range_m
         return cls(way, np.degrees(angles), SIGMAS * sigma[3:6] + HIDDEN * excess_m, excess_m)
+
+    @property
+    def mount(self) -> Mounted:
+        """The found mount."""
+        return Mounted(self.way.fitted.R_body_from_mbes, self.way.fitted.lever_arm_m)
 
     def turn_deg(self, R: Array) -> Array:
         """Return the rotation vector (3,) from a rotation to the found one, degrees, body axes."""
