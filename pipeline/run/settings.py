@@ -7,15 +7,15 @@ from typing import Any
 
 import yaml
 
-from pipeline.atomic_files import sha256, write_text
+from pipeline.atomic_files import write_text
 from pipeline.config.about import About
 from pipeline.config.fill_in import refuse_unfilled
-from pipeline.config.load import load_pool, load_session, session_yaml, stated_keys
+from pipeline.config.load import pool_in, session_in, session_yaml, stated_keys
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import Calibrated, Mbes, SessionConfig
 from pipeline.config.stage_settings import settings_by_name
 from pipeline.config.target import Target
-from pipeline.config.yaml_file import SESSION_YAML, read_yaml, text_of
+from pipeline.config.yaml_file import SESSION_YAML, YamlFile, read_yaml
 from pipeline.config.yaml_models import parse
 from pipeline.errors import ArtefactError, ConfigError
 from pipeline.readers.casts import with_cast
@@ -57,7 +57,7 @@ class Settings:
 
 
 def load_settings(session_folder: Path, config_path: Path, calibrated: Calibrated | None = "mbes") -> Settings:
-    """Read and check both YAML files.
+    """Read and check both YAML files, each of them once: a file that is changed meanwhile gives no mixture.
 
     Parameters
     ----------
@@ -69,15 +69,15 @@ def load_settings(session_folder: Path, config_path: Path, calibrated: Calibrate
         "mbes": the sonar. "laser": the laser; a sonar in the session is ignored. None: the sonar if the session has
         one, otherwise the laser.
     """
-    if config_path.is_file():
-        refuse_unfilled({path: text_of(path) for path in (session_yaml(session_folder), config_path)})
-    pool = load_pool(config_path)
+    files = {"session": YamlFile.read(session_yaml(session_folder)), "config": YamlFile.read(config_path)}
+    refuse_unfilled(files.values())
+    pool = pool_in(files["config"])
     try:
         target_of(pool.target)
     except ConfigError as error:
         raise ConfigError(f"{config_path}: {error}") from error
     refuse_unknown_faces(pool, config_path)
-    session = load_session(session_folder, with_cast)
+    session = session_in(files["session"], with_cast)
     if calibrated == "laser":
         session = session.model_copy(update={"mbes": None})
     elif calibrated == "mbes" and session.calibrated == "laser":
@@ -85,10 +85,9 @@ def load_settings(session_folder: Path, config_path: Path, calibrated: Calibrate
         raise ConfigError(f"{where}: mbes: is missing; add it (poolcal laser calibrates the laser without a sonar)")
     if session.mbes is not None:
         refuse_shallow_cast(pool.target, session.mbes, session_folder / SESSION_YAML)
-    paths = {"session": session_folder / SESSION_YAML, "config": config_path}
-    files = {name: sha256(path) for name, path in paths.items()}
-    stated = {name: stated_keys(path) for name, path in paths.items()}
-    return Settings(session_folder.resolve(), pool, session, files, stated)
+    digests = {name: file.sha256 for name, file in files.items()}
+    stated = {name: stated_keys(file.content) for name, file in files.items()}
+    return Settings(session_folder.resolve(), pool, session, digests, stated)
 
 
 def refuse_unknown_faces(pool: PoolConfig, path: Path) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 
 from pipeline.config.instruments import PRESETS
 from pipeline.config.load import load_pool, stated_keys
+from pipeline.config.yaml_file import read_yaml
 from pipeline.config.session import SessionConfig
 from pipeline.results.pages.assumptions import assumed_groups
 from pipeline.results.pages.instrument_table import instrument_rows
@@ -21,7 +22,7 @@ from tests.support.preset_sessions import FOREIGN, session
 def _settings(folder: Path, found: SessionConfig) -> Settings:
     """The session with the demo's pool, as poolcal run has them: with the keys that the files state."""
     pool = PRESETS.parent / "defaults.yaml"
-    stated = {"session": stated_keys(folder / "session.yaml"), "config": stated_keys(pool)}
+    stated = {"session": stated_keys(read_yaml(folder / "session.yaml")), "config": stated_keys(read_yaml(pool))}
     return Settings(folder, load_pool(pool), found, {}, stated)
 
 
