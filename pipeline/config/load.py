@@ -79,7 +79,7 @@ def session_in(file: YamlFile, with_cast: WithCast | None = None) -> SessionConf
 
 
 def stated_keys(content: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the dotted keys to which a YAML file's content itself gives a value (``ins.drift.heading_deg``), in its order.
+    """Return the dotted keys that a YAML file's content states itself (``ins.drift.heading_deg``), in its order.
 
     A block's own key is none of them, nor are keys below ``about``, from which nothing is computed.
     """

@@ -70,7 +70,7 @@ class YamlFile:
 
     @property
     def sha256(self) -> str:
-        """The SHA-256 of the file's bytes. (Strict UTF-8 gives the same bytes back.)"""
+        """The SHA-256 of the file's bytes. Strict UTF-8 gives the same bytes back."""
         return hashlib.sha256(self.text.encode()).hexdigest()
 
 

@@ -182,8 +182,19 @@ def test_qimeras_sheet_tells_the_transmitters_place_or_that_it_is_not_known() ->
     level = mounted(0.0, 0.0, 30.0, 0.1, 0.2, -1.0)
     sheet = export_text(TARGETS["qimera"], mounting(level, projector_offset_m=(0.0, 0.2, 0.0)), Options())
     x, y = 0.1 - 0.2 * np.sin(np.radians(30.0)), 0.2 + 0.2 * np.cos(np.radians(30.0))
-    assert f"Transmitter, m: X {x:.4f}, Y {y:.4f}, Z -1.0000." in sheet
+    assert f"Transmitter, m: X {x:.4f}, Y {y:.4f}, Z -1.0000. Receiver, m: X 0.1000, Y 0.2000, Z -1.0000." in sheet
     assert "--projector-offset" in export_text(TARGETS["qimera"], mounting(level), Options())
+
+
+def test_qimeras_sheet_takes_kongsbergs_lever_arm_for_neither_array() -> None:
+    """It has x and z of the receiver, y of the transmitter: with the transmitter 0.2 m ahead the receiver is aft."""
+    level = mounted(0.0, 0.0, 0.0, 0.1, 0.2, -1.0)
+    apart = mounting(level, split=True, projector_offset_m=(0.05, 0.2, -0.1))
+    sheet = export_text(TARGETS["qimera"], apart, Options())
+    assert "Transmitter, m: X 0.1500, Y 0.2000, Z -1.1000. Receiver, m: X 0.1000, Y 0.0000, Z -1.0000." in sheet
+    unknown = export_text(TARGETS["qimera"], mounting(level, split=True), Options())
+    assert "the position above is of neither" in unknown
+    assert "receiver's" not in unknown
 
 
 @pytest.mark.parametrize("name", sorted(set(TARGETS) - {"kluster"}))

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from pipeline.exports.convention import SFU, Convention
 from pipeline.exports.mounting import Mounting
+from pipeline.exports.reading import written
 from pipeline.exports.sheet import DECIMALS, Sheet
 from pipeline.exports.target import Options, Target
 
@@ -24,15 +25,28 @@ ANGLES = {"roll": "Roll", "pitch": "Pitch", "yaw": "Heading"}
 
 
 def _arrays(target: Target, mounting: Mounting, _: Options) -> list[str]:
-    """Return what stands for the transmitter, where the editor has it apart from the receiver."""
+    """Return what stands for transmitter and receiver, where the editor has them apart.
+
+    The lever arm is the receiver's, but with the transmitter's y where Kongsberg's files tell both (``split``).
+    """
+    if mounting.projector_offset_m is None and mounting.split:
+        return [
+            "If the editor has transmitter and receiver apart, the position above is of neither (forward of the",
+            "transmitter, starboard and up of the receiver): export again with --projector-offset.",
+        ]
     if mounting.projector_offset_m is None:
         return [
             "If the editor has transmitter and receiver apart: the same angles in both; the position above is the",
             "receiver's. For the transmitter's export again with --projector-offset (0 0 0: both at one point).",
         ]
-    place = target.convention.numbers(mounting.arrays()[0]).by_role()
-    where = ", ".join(f"{name} {place[role]:.{DECIMALS}f}" for role, name in POSITION.items())
-    return [f"If the editor has transmitter and receiver apart: the same angles in both. Transmitter, m: {where}."]
+    places = [target.convention.numbers(mounted).by_role() for mounted in mounting.arrays()]
+    transmitter, receiver = (
+        ", ".join(f"{name} {written(place[role], DECIMALS)}" for role, name in POSITION.items()) for place in places
+    )
+    return [
+        "If the editor has transmitter and receiver apart: the same angles in both.",
+        f"Transmitter, m: {transmitter}. Receiver, m: {receiver}.",
+    ]
 
 
 _QINSY = Sheet(

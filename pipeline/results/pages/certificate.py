@@ -80,7 +80,7 @@ def certificate_values(
         "soundings": _soundings(block["covariance_total"]) if sonar and block["covariance_total"] else None,
         "done": _done(result, sonar),
         "speed": _speed(tables.table(PASSES)),
-        "assumed": list(assumed_groups(settings, bool(result["ins_drift"]["from_files"]))),
+        "assumed": list(assumed_groups(settings, result["ins_drift"]["from_files"])),
         "assumed_recorded": is_recorded(settings),
         "digests": _digests(manifests, result, settings),
     }
