@@ -219,6 +219,8 @@ def test_report_refuses_what_is_not_finished(done: Place, tmp_path: Path) -> Non
         assert (told.status, len(told.err.splitlines())) == (2, 1), told.err
         assert words in told.err
     assert mine.read_text() == "my notes"
+    told = poolcal("report", done.run, "--certificate")
+    assert (told.status, told.err.count("\n"), "add --pdf FILE" in told.err) == (2, 1, True)
     shutil.rmtree(done.run / "adjust")
     told = poolcal("report", done.run, "--pdf", pdf)
     assert (told.status, len(told.err.splitlines())) == (2, 1)
