@@ -1,5 +1,6 @@
 """Settings of a run. They are read from YAML, kept in run.yaml, and refused if they cannot be correct."""
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -132,14 +133,14 @@ def refuse_shared_folder(run: Path, session_folder: Path) -> None:
             str(path).encode()
         except UnicodeEncodeError as error:
             raise ConfigError(f"{str(path)!r}: the name is no UTF-8 text; rename the folder") from error
-    inner, outer = run.resolve(), session_folder.resolve()
+    inner, outer = (Path(os.path.realpath(path)) for path in (run, session_folder))  # a link to itself, too
     if inner.is_relative_to(outer) or outer.is_relative_to(inner):
         raise ConfigError(f"--run {run}: lies in the session folder {session_folder}, or round it; name a folder apart")
 
 
 def holds_run(run: Path) -> bool:
     """Return whether ``run`` is a run folder: run.yaml is in it."""
-    return (run / RUN_YAML).is_file()
+    return os.path.isfile(run / RUN_YAML)  # a folder that is closed to us is none
 
 
 def refuse_other_sensor(run: Path, calibrated: Calibrated) -> None:
@@ -172,7 +173,7 @@ def write_settings(run: Path, settings: Settings) -> None:
 def read_settings(run: Path) -> Settings:
     """Return the settings in run.yaml, with which the run in this folder was made."""
     path = run / RUN_YAML
-    if not path.is_file():
+    if not holds_run(run):
         raise ArtefactError(f"{run}: holds no {RUN_YAML}, so it is no run folder; name one of poolcal run's")
     content = read_yaml(path)
     folder, files, stated = content.get("session_folder"), content.get("files", {}), content.get("stated", {})

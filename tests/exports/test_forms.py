@@ -186,6 +186,16 @@ def test_qimeras_sheet_tells_the_transmitters_place_or_that_it_is_not_known() ->
     assert "--projector-offset" in export_text(TARGETS["qimera"], mounting(level), Options())
 
 
+def test_qimeras_sheet_wants_the_ins_where_the_values_count_it() -> None:
+    """With the INS apart from the reference point, its sensors at 0, 0, 0 would count its place twice."""
+    own = text_of("qimera")
+    assert "position and motion sensor stand at 0, 0, 0 there, without angles" in own
+    for frame in (VesselFrame((0.0, 0.0, 0.4)), VesselFrame(ins_turn_deg=(0.0, 0.0, 5.0))):
+        sheet = text_of("qimera", frame=frame)
+        assert "0, 0, 0" not in sheet
+        assert "motion sensor stand there as the INS does by --ins-point and --ins-turn" in sheet
+
+
 def test_qimeras_sheet_takes_kongsbergs_lever_arm_for_neither_array() -> None:
     """It has x and z of the receiver, y of the transmitter: with the transmitter 0.2 m ahead the receiver is aft."""
     level = mounted(0.0, 0.0, 0.0, 0.1, 0.2, -1.0)

@@ -49,6 +49,14 @@ def _arrays(target: Target, mounting: Mounting, _: Options) -> list[str]:
     ]
 
 
+def _as_in_qimera(target: Target, mounting: Mounting, options: Options) -> list[str]:
+    """Return what must stand in the editor beside the values: the two arrays, and the INS as the values count on it."""
+    ins = "at 0, 0, 0 there, without angles of their own"
+    if not mounting.frame.is_ins:
+        ins = "there as the INS does by --ins-point and --ins-turn (below)"
+    return [*_arrays(target, mounting, options), f"The values hold if position and motion sensor stand {ins}."]
+
+
 _QINSY = Sheet(
     groups=(
         ("Template, object (vessel): node of the sonar, e.g. MBES", POSITION),
@@ -68,9 +76,8 @@ _QIMERA = Sheet(
     zeros="Must be zero: the calibration (patch test) results of the same sonar that Qimera's own tool has stored.",
     notes=(
         "Loading a session replaces what stands in the vessel editor: enter the values after the import.",
-        "They hold if position and motion sensor stand at 0, 0, 0 there, without angles of their own.",
     ),
-    extra=_arrays,
+    extra=_as_in_qimera,
 )
 QINSY = _QINSY.target("qinsy", "QPS Qinsy", CONVENTION)
 QIMERA = _QIMERA.target("qimera", "QPS Qimera", OF_QIMERA)
