@@ -70,9 +70,10 @@ def load_settings(session_folder: Path, config_path: Path, calibrated: Calibrate
         "mbes": the sonar. "laser": the laser; a sonar in the session is ignored. None: the sonar if the session has
         one, otherwise the laser.
     """
-    files = {"session": YamlFile.read(session_yaml(session_folder)), "config": YamlFile.read(config_path)}
+    config = YamlFile.read(config_path)
+    files = {"session": YamlFile.read(session_yaml(session_folder)), "config": config}
     refuse_unfilled(files.values())
-    pool = pool_in(files["config"])
+    pool = pool_in(config)
     try:
         target_of(pool.target)
     except ConfigError as error:
