@@ -143,7 +143,7 @@ def test_the_programs_own_code_makes_the_mount_of_the_numbers() -> None:
 def test_hvf_has_the_angles_in_one_place_and_the_time_of_the_first_pass(roll: float, place: str) -> None:
     text = export_text(TARGETS["caris-hvf"], mounting(mounted(roll, 0.0, 0.0)), Options())
     root = ET.fromstring(text)
-    holders = [sensor.tag for sensor in root if any(float(angle.get("Roll")) for angle in sensor.iter("MountAngle"))]
+    holders = [sensor.tag for sensor in root if any(float(angle.attrib["Roll"]) for angle in sensor.iter("MountAngle"))]
     assert holders == [place]
     assert {stamp.get("value") for stamp in root.iter("TimeStamp")} == {"2026-132 08:00:03"}
 

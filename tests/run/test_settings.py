@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.atomic_files import read_regular
 from pipeline.config import yaml_file
 from pipeline.config.instruments import PRESETS
 from pipeline.run.settings import load_settings
@@ -23,11 +24,10 @@ def test_a_file_saved_while_it_is_read_gives_no_mixture(tmp_path: Path, monkeypa
     paths = {"session": tmp_path / "s" / "session.yaml", "config": pool}
     before = {name: path.read_bytes() for name, path in paths.items()}
     reads: Counter[Path] = Counter()
-    read = yaml_file.read_regular
 
     def read_then_saved(path: Path, most: int) -> bytes:
         reads[path] += 1
-        content = read(path, most)
+        content = read_regular(path, most)
         path.write_text(content.decode().replace("range_sigma_m: 0.006", "angle_sigma_deg: 0.01") + "# saved\n")
         return content
 
