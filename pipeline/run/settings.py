@@ -16,7 +16,7 @@ from pipeline.config.pool import PoolConfig
 from pipeline.config.session import Calibrated, Mbes, SessionConfig
 from pipeline.config.stage_settings import settings_by_name
 from pipeline.config.target import Target
-from pipeline.config.yaml_file import SESSION_YAML, YamlFile, read_yaml
+from pipeline.config.yaml_file import SESSION_YAML, YamlFile, content_of, read_yaml, text_of
 from pipeline.config.yaml_models import parse
 from pipeline.errors import ArtefactError, ConfigError
 from pipeline.readers.casts import with_cast
@@ -44,13 +44,20 @@ class Settings:
         return settings_by_name(self.pool, self.session)
 
     def is_about_changed(self) -> bool:
-        """Return whether ``about`` in session.yaml is another than the run's; False if it cannot be read."""
+        """Return whether ``about`` in session.yaml is another than the run's; False if there is no such file now.
+
+        A file with a fault has been edited since, and may hold names that the run does not have.
+        """
         path = self.session_folder / SESSION_YAML
         try:
-            block = read_yaml(path).get("about") or {}
-            return isinstance(block, dict) and parse(About, block, str(path)) != self.session.about
+            text = text_of(path)
         except ConfigError:
             return False
+        try:
+            block = content_of(text, path).get("about") or {}
+            return not isinstance(block, dict) or parse(About, block, str(path)) != self.session.about
+        except ConfigError:
+            return True
 
     def as_json(self) -> dict[str, Any]:
         """Return the settings as plain values, defaults filled in."""

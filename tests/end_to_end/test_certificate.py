@@ -242,6 +242,8 @@ def test_names_that_came_after_the_run_are_not_left_out_in_silence(done: Place, 
     told = poolcal("report", done.run, "--pdf", pdf)
     assert (told.status, len(told.err.splitlines()), pdf.exists()) == (2, 1, False)
     assert "poolcal run again" in told.err
+    done.edit_session("about", client=None, custommer="Port of Qingdao")  # misspelt: it is not left out either
+    assert poolcal("report", done.run, "--pdf", pdf).status == 2
     done.edit_session("", about=None)
     done.edit_session("mbes", mount={"x_m": 0.37})  # as poolcal laser writes the mount that it found
     assert poolcal("report", done.run).err == ""
