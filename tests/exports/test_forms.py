@@ -208,6 +208,14 @@ def test_qimeras_sheet_takes_kongsbergs_lever_arm_for_neither_array() -> None:
 
 
 @pytest.mark.parametrize("name", sorted(set(TARGETS) - {"kluster"}))
+def test_a_form_tells_what_was_estimated_with_the_mount(name: str) -> None:
+    """A mount found beside a latency is wrong without it."""
+    words = " ".join(text_of(name, origin=replace(ORIGIN, free=("the sonar's clock is 12 ms late",))).split())
+    assert "Estimated with the mount: the sonar's clock is 12 ms late. The values hold with that alone" in words
+    assert "Estimated with the mount" not in text_of(name)
+
+
+@pytest.mark.parametrize("name", sorted(set(TARGETS) - {"kluster"}))
 def test_a_form_tells_which_run_it_is_of(name: str) -> None:
     words = " ".join(text_of(name, origin=replace(ORIGIN, digest="ab" * 32)).split())
     assert f"Verdict: accepted. First pass: {ORIGIN.start_utc}." in words
