@@ -210,8 +210,8 @@ def test_qimeras_sheet_takes_kongsbergs_lever_arm_for_neither_array() -> None:
 @pytest.mark.parametrize("name", sorted(set(TARGETS) - {"kluster"}))
 def test_a_form_tells_what_was_estimated_with_the_mount(name: str) -> None:
     """A mount found beside a latency is wrong without it."""
-    words = " ".join(text_of(name, origin=replace(ORIGIN, free=("the sonar's clock is 12 ms late",))).split())
-    assert "Estimated with the mount: the sonar's clock is 12 ms late. The values hold with that alone" in words
+    words = " ".join(text_of(name, origin=replace(ORIGIN, free=("its latency is 12 ms more",))).split())
+    assert "Estimated with the mount: its latency is 12 ms more. The values hold with that alone" in words
     assert "Estimated with the mount" not in text_of(name)
 
 
