@@ -241,6 +241,8 @@ def test_report_refuses_what_is_not_finished(done: Place, tmp_path: Path) -> Non
         assert (told.status, len(told.err.splitlines())) == (2, 1), told.err
         assert words in told.err
     assert mine.read_text() == "my notes"
+    told = poolcal("report", done.run, "--certificate")
+    assert (told.status, told.err.count("\n"), "add --pdf FILE" in told.err) == (2, 1, True)
     shutil.rmtree(done.run / "adjust")
     told = poolcal("report", done.run, "--pdf", pdf)
     assert (told.status, len(told.err.splitlines())) == (2, 1)
@@ -262,6 +264,8 @@ def test_names_that_came_after_the_run_are_not_left_out_in_silence(done: Place, 
     told = poolcal("report", done.run, "--pdf", pdf)
     assert (told.status, len(told.err.splitlines()), pdf.exists()) == (2, 1, False)
     assert "poolcal run again" in told.err
+    done.edit_session("about", client=None, custommer="Port of Qingdao")  # misspelt: it is not left out either
+    assert poolcal("report", done.run, "--pdf", pdf).status == 2
     done.edit_session("", about=None)
     done.edit_session("mbes", mount={"x_m": 0.37})  # as poolcal laser writes the mount that it found
     assert poolcal("report", done.run).err == ""

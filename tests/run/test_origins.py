@@ -8,20 +8,22 @@ from typing import Any
 from pipeline.config.instruments import PRESETS
 from pipeline.config.load import load_pool, stated_keys
 from pipeline.config.session import SessionConfig
-from pipeline.results.pages.assumptions import assumed_groups
+from pipeline.config.yaml_file import read_yaml
+from pipeline.results.pages.assumptions import assumed_groups, drift_note
 from pipeline.results.pages.instrument_table import instrument_rows
 from pipeline.results.pages.rendering import render_page
-from pipeline.run.assumed_drift import assumed_drift
 from pipeline.run.origins import is_recorded, origin_of
 from pipeline.run.settings import Settings, read_settings, write_settings
 from tests.support.pages import Page
 from tests.support.preset_sessions import FOREIGN, MOUNT, session
 
+SIGMAS = ("horizontal_m", "vertical_m", "roll_pitch_deg", "heading_deg")
+
 
 def _settings(folder: Path, found: SessionConfig) -> Settings:
     """The session with the demo's pool, as poolcal run has them: with the keys that the files state."""
     pool = PRESETS.parent / "defaults.yaml"
-    stated = {"session": stated_keys(folder / "session.yaml"), "config": stated_keys(pool)}
+    stated = {"session": stated_keys(read_yaml(folder / "session.yaml")), "config": stated_keys(read_yaml(pool))}
     return Settings(folder, load_pool(pool), found, {}, stated)
 
 
@@ -148,15 +150,32 @@ def test_the_covariance_that_poolcal_laser_wrote_is_none_of_the_coarse_mount(tmp
         assert ("the coarse mount" in groups) == assumed, origin
 
 
-def test_the_note_on_the_drift_is_there_only_where_nobody_stated_it(tmp_path: Path) -> None:
+def test_the_certificate_names_what_the_ins_s_files_do_not_give(tmp_path: Path) -> None:
+    """A log with an accuracy of the heading alone leaves the others to the program."""
+    groups = _said(assumed_groups(_settings(tmp_path, session(tmp_path)), ("heading_deg",)))
+    assert "INS (horizontal 15 mm, vertical 20 mm, roll and pitch 0.01°, time constant 200 s)" in groups
+
+
+def test_the_note_on_the_drift_names_the_figures_that_nobody_stated(tmp_path: Path) -> None:
     plain = _settings(tmp_path, session(tmp_path))
-    assert "its drift is assumed: 0.015 m horizontal, 0.02 m vertical, 0.01°" in assumed_drift(plain, False)
-    assert assumed_drift(plain, True) == ""
-    assert assumed_drift(replace(plain, stated={}), False) == ""
-    given = _settings(tmp_path, session(tmp_path, ins={"drift": {"heading_deg": 0.03}}))
-    assert assumed_drift(given, False) == ""
-    ins = {"title": "I", "sensor": "ins", "settings": {"drift": {"heading_deg": 0.03}}}
-    assert assumed_drift(_settings(tmp_path, session(tmp_path, {"mine": ins}, ins={"instrument": "mine"})), False) == ""
+    every = "horizontal 15 mm, vertical 20 mm, roll and pitch 0.01°, heading 0.03°, time constant 200 s"
+    assert drift_note(plain, ()).endswith(f"nor the INS's log states them: {every}")
+    assert drift_note(plain, SIGMAS) == ""  # but for the time constant
+    assert drift_note(plain, SIGMAS[1:]).endswith("states them: horizontal 15 mm, time constant 200 s")
+    assert drift_note(replace(plain, stated={}), ()) == ""
+    whole = dict.fromkeys(SIGMAS, 0.02)
+    assert drift_note(_settings(tmp_path, session(tmp_path, ins={"drift": whole})), ()) == ""
+
+
+def test_a_part_of_the_drift_that_is_stated_does_not_silence_the_note(tmp_path: Path) -> None:
+    """Stated in part, ins.drift goes before the log's accuracies, and the rest is the program's."""
+    note = drift_note(_settings(tmp_path, session(tmp_path, ins={"drift": {"heading_deg": 0.05}})), ())
+    assert note.endswith("no accuracies of the INS's log are used: horizontal 15 mm, vertical 20 mm, "
+                         "roll and pitch 0.01°, time constant 200 s")  # fmt: skip
+    ins = {"title": "I", "sensor": "ins", "settings": {"drift": {"heading_deg": 0.05}}}
+    of_preset = _settings(tmp_path, session(tmp_path, {"mine": ins}, ins={"instrument": "mine"}))
+    assert "heading" not in drift_note(of_preset, ())
+    assert "nor the INS's log states them: horizontal 15 mm" in drift_note(of_preset, ())
 
 
 def test_the_stated_keys_are_kept_in_run_yaml(tmp_path: Path) -> None:

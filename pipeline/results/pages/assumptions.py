@@ -1,10 +1,15 @@
-"""What enters the stated uncertainty though nobody stated it: defaults of the program, in words for the certificate."""
+"""What enters the stated uncertainty though nobody stated it: defaults of the program, in words, for all that say so.
+
+The certificate names all such figures; ``poolcal check`` and the screen after a run name those of the INS's drift.
+"""
 
 from collections.abc import Collection, Iterator, Mapping
+from pathlib import Path
+from typing import Any
 
 from pipeline.config.session import Laser, SessionConfig
 from pipeline.run.origins import is_assumed, value_of
-from pipeline.run.settings import Settings
+from pipeline.run.settings import Settings, read_settings
 
 OF_INS = {
     "ins.drift.horizontal_m": "horizontal {} mm",
@@ -44,7 +49,7 @@ CLOCKS = {"laser.latency_sigma_s": "of the laser {} ms", "mbes.latency_sigma_s":
 IN_THOUSANDTHS = ("_m", "latency_sigma_s")  # ends of keys that are shown in mm or ms
 
 
-def assumed_groups(settings: Settings, drift_from_files: Collection[str]) -> Iterator[Mapping[str, str | list[str]]]:
+def assumed_groups(settings: Settings, from_files: Collection[str]) -> Iterator[Mapping[str, str | list[str]]]:
     """Yield each group of figures that enter the total sigmas and that neither a file nor a preset gave, in words.
 
     Figures that the data correct by their variance factors (noise of ranges, of angles, of the INS's records) are none.
@@ -53,15 +58,48 @@ def assumed_groups(settings: Settings, drift_from_files: Collection[str]) -> Ite
     ----------
     settings
         The run's settings.
-    drift_from_files
-        The figures of the drift that the INS's files gave, such as ``horizontal_m``.
+    from_files
+        The figures of the drift that the INS's files gave: ``horizontal_m``, say. The time constant is never theirs.
     """
-    given = {f"ins.drift.{name}" for name in drift_from_files}
     for words, keys in _groups(settings.session).items():
-        assumed = {key: form for key, form in keys.items() if key not in given and is_assumed(settings, key)}
-        if assumed:
-            figures = [form.format(_number(settings, key)) for key, form in assumed.items()]
+        figures = list(_assumed(settings, keys, from_files).values())
+        if figures:
             yield {"words": words, "figures": figures}
+
+
+def note_of_run(run: Path, result: Mapping[str, Any]) -> str:
+    """Return the note on a run's drift; ``result``: the content of its calibration.json."""
+    return drift_note(read_settings(run), result["ins_drift"]["from_files"])
+
+
+def drift_note(settings: Settings, from_files: Collection[str]) -> str:
+    """Return the note that figures of the INS's drift are assumed; empty if none is but the time constant.
+
+    Parameters
+    ----------
+    settings, from_files
+        As in :func:`assumed_groups`.
+    """
+    figures = _assumed(settings, OF_INS, from_files)
+    if not figures.keys() - {"ins.drift.time_constant_s"}:
+        return ""
+    words = ", ".join(figures.values())
+    if settings.session.ins.drift_from == "files":
+        return (
+            "these figures of the INS's drift are assumed, for neither session.yaml nor the INS's log states them: "
+            f"{words}"
+        )
+    return (
+        "these figures of the INS's drift are assumed, for session.yaml does not state them, and because of its "
+        f"ins.drift or ins.drift_from no accuracies of the INS's log are used: {words}"
+    )
+
+
+def _assumed(settings: Settings, keys: Mapping[str, str], from_files: Collection[str]) -> dict[str, str]:
+    """Return by key those figures, in words, that neither a file of settings nor a preset nor the INS's files gave."""
+    given = {f"ins.drift.{name}" for name in from_files}
+    assumed = (key for key in keys if key not in given and is_assumed(settings, key))
+    return {key: keys[key].format(_number(settings, key)) for key in assumed}
 
 
 def _groups(session: SessionConfig) -> Mapping[str, Mapping[str, str]]:
