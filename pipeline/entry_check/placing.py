@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 GEOGRAPHIC = "EPSG:4979"
 NEAR_M = 20_000.0  # a guessed CRS places the points within this of the target
 MOST_HINTS = 3
+LONGEST_NAME = 40  # letters; a longer one is a whole definition (WKT, PROJ)
 SOME = 1000  # coordinates with which a CRS is tried
 
 
@@ -75,7 +76,7 @@ def placing_of(name: str, side: RunSide) -> Placing:
         level = horizontal_part(crs)
         factors = Proj(level).get_factors(side.longitude_deg, side.latitude_deg) if level.is_projected else None
         return Placing(
-            name=name,
+            name=name if len(name) < LONGEST_NAME else ":".join(crs.to_authority() or ("as the file says",)),
             title=crs.name,
             to_ecef=None if level.is_geocentric else ecef_function(level),
             swapped=False,

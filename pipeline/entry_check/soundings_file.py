@@ -29,6 +29,7 @@ MOST_POINTS = 600_000  # of the file, near the track; beyond, every other block 
 BLOCK_ROWS = 512
 MARGIN_M = 10.0  # by how much a lever arm may be wrong
 LEAST_POINTS = 60
+SOFTWARE = slice(58, 90)  # bytes of a LAS file with its generating software
 COARSEST_M = 0.1
 GRID_STEP_M, GRID_ROUNDING = 0.04, 0.1  # least cell of a grid; of multiples of the cell, as a share of it
 
@@ -91,9 +92,20 @@ def opened_source(path: Path) -> Source:
     if kind is GSF:
         return Source(gsf_points(path), GEOGRAPHIC, True, POSITION_STEP_M, depths=True)
     if kind is LAS:
+        if _is_written_here(path):
+            raise RawDataError(
+                f"{path}: is a cloud of poolcal export, which proves nothing of another program; export the soundings "
+                "from that program"
+            )
         return Source(_las(path), crs_of_las(path, str(path)))
     layout = text_layout(path)
     return Source(text_points(path, layout), geographic=layout.geographic, depths=layout.depths)
+
+
+def _is_written_here(path: Path) -> bool:
+    """Whether a LAS file names poolcal as the generating software."""
+    with opened(path, str(path)) as file:
+        return file.read(SOFTWARE.stop)[SOFTWARE].startswith(b"poolcal ")
 
 
 def _las(path: Path) -> Batches:

@@ -11,6 +11,8 @@ from pipeline.entry_check.answer import EVEN, Answer
 from pipeline.entry_check.check import EntryCheck
 from pipeline.entry_check.explanations import PART_NAMES, Explanation
 from pipeline.entry_check.judging import TOLERANCE_DEG, TOLERANCE_M
+from pipeline.exports.reading import ROLES
+from pipeline.exports.target import Target
 from pipeline.language.chosen import translated
 from pipeline.language.letters import has_wide
 from pipeline.maths.mount_parameters import PARAMETERS
@@ -21,13 +23,21 @@ WIDTH = 100
 BULLET = "  - "
 COARSE_M = 0.002
 TELLS_DEG, TELLS_M = 5.0, 0.5  # beyond, an answer excludes nothing that anybody would enter
+OTHER_SIGNS = (
+    "These are poolcal's signs; your program may have others: add --to NAME, such as qimera, to see both values in its "
+    "own (poolcal export --list shows the names)."
+)
 SHOWN_EXCESS_M = 0.002  # a smaller scatter beyond rounding is not worth a word
 
 
-def check_text(check: EntryCheck) -> str:
-    """Return the answer as text for the screen."""
+def check_text(check: EntryCheck, program: Target | None) -> str:
+    """Return the answer as text for the screen; ``program``: in whose signs the values are shown as well."""
     lines = [line for text in _answer(check) for line in _wrapped(text, "  ")]
     lines += ["", *_table(check), ""]
+    if program is not None:
+        lines += [*_table_of(program, check), ""]
+    elif check.answer.verdict in ("wrong", "undecidable"):
+        lines += [*_wrapped(OTHER_SIGNS, ""), ""]
     lines += [line for text in _basis(check) for line in _wrapped(text, "")]
     return "\n".join(lines)
 
@@ -124,9 +134,9 @@ def _about_z(answer: Answer) -> Iterator[str]:
 
 def _rows(check: EntryCheck) -> Iterator[tuple[str, str, float, float, float, float]]:
     """Yield name, unit, calibrated and found value, difference and sigma of each setting."""
-    fitted, total = check.answer.way.fitted, check.source.total
-    found = Mounted(fitted.R_body_from_mbes, fitted.lever_arm_m)
-    wanted, values, sigmas = total.settings(), found.settings(), found.sigmas(fitted.covariance[:6, :6])
+    fitted, found = check.answer.way.fitted, _found(check)
+    wanted, values = check.source.total.settings(), found.settings()
+    sigmas = found.sigmas(fitted.covariance[:6, :6])
     for name, _, key, unit in PARAMETERS:
         yield name, unit, wanted[key], values[key], setting_change(values, wanted, key), sigmas[key]
 
@@ -137,6 +147,24 @@ def _table(check: EntryCheck) -> list[str]:
         mark = "°" if unit == "deg" else "m"
         rows.append([name, f"{wanted:.4f}", f"{found:.4f}", signed(difference, 4), f"{sigma:.4f}", mark])
     return text_table("<6>12>12>12>10 <2", ["mount", "calibrated", "found", "difference", "sigma", ""], rows)
+
+
+def _table_of(program: Target, check: EntryCheck) -> list[str]:
+    """Return the same values as the program has them; with an order of rotations that is not known, as on its sheet."""
+    convention, senses = program.convention, program.convention.words()
+    wanted, found = (convention.numbers(one).by_role() for one in (check.source.total, _found(check)))
+    rows = []
+    for role in ROLES:
+        unit = "m" if role in ("x", "y", "z") else "°"
+        name = f"{translated(role)} ({translated(senses[role])})"
+        rows.append([name, f"{wanted[role]:.4f}", f"{found[role]:.4f}", unit])
+    title = f"In the signs of {program.title}, positions from the INS:"
+    return [*_wrapped(title, ""), *text_table("<6>12>12 <2", ["", "to be entered", "found", ""], rows)]
+
+
+def _found(check: EntryCheck) -> Mounted:
+    fitted = check.answer.way.fitted
+    return Mounted(fitted.R_body_from_mbes, fitted.lever_arm_m)
 
 
 def _basis(check: EntryCheck) -> Iterator[str]:

@@ -241,6 +241,34 @@ def test_bad_input_is_one_line(run: Path, tmp_path: Path, content: str, more: tu
     assert told.err.count("\n") == 1
 
 
+def test_the_values_stand_in_the_signs_of_the_program_too(
+    run: Path, recorded: Recording, right: Entry, tmp_path: Path
+) -> None:
+    """Qimera's heading is + to starboard: what stands there wrongly is poolcal's number, and looks right."""
+    file, (roll, pitch, heading) = tmp_path / "a.xyz", right.angles_deg
+    write_points(file, in_crs(georeferenced(recorded, replace(right, angles_deg=(roll, pitch, -heading))), UTM), 3)
+    told = poolcal("check-entry", run, file, "--to", "qimera")
+    assert (told.status, told.err) == (1, "")
+    (line,) = [line for line in told.out.splitlines() if line.startswith("yaw (bow to starboard +")]
+    to_be_entered, found = map(float, line.rpartition(")")[2].split()[:2])
+    assert to_be_entered == pytest.approx(heading, abs=1e-4)
+    assert found == pytest.approx(-heading, abs=1e-3)
+    assert "add --to NAME" not in told.out
+    told = poolcal("check-entry", run, file)
+    assert "These are poolcal's signs; your program may have others: add --to NAME" in told.out
+    for program, said in (("qimera2", "is no program known here"), ("pdal", "takes the laser's mount")):
+        told = poolcal("check-entry", run, file, "--to", program)
+        assert (told.status, told.err.count("\n")) == (2, 1)
+        assert said in told.err
+
+
+def test_a_cloud_of_poolcal_itself_proves_nothing(run: Path, tmp_path: Path) -> None:
+    assert poolcal("export", run, "--to", "laz", "--crs", UTM, "--out", tmp_path / "own.laz").status == 0
+    told = poolcal("check-entry", run, tmp_path / "own.laz")
+    assert (told.status, told.out, told.err.count("\n")) == (2, "", 1)
+    assert "proves nothing of another program" in told.err
+
+
 def test_a_grid_is_refused(run: Path, recorded: Recording, right: Entry, tmp_path: Path) -> None:
     file = tmp_path / "a.xyz"
     points = in_crs(georeferenced(recorded, right), UTM)
