@@ -21,6 +21,7 @@ DEMO    := runs/demo-session
 .DEFAULT_GOAL := help
 .SUFFIXES:
 MAKEFLAGS += --no-builtin-rules
+unexport PYTHONDONTWRITEBYTECODE # containers set it: then each start of the program, some hundred in test, compiles it
 .PHONY: docs help packages setup setup-visual demo calibrate repeat stages diff view test thorough lint format bench pictures montecarlo clean
 
 help: ## this list

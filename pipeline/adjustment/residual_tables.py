@@ -58,20 +58,24 @@ def bins_table(residuals: pd.DataFrame, faces: pd.DataFrame) -> pd.DataFrame:
 
 def map_table(residuals: pd.DataFrame, faces: pd.DataFrame) -> pd.DataFrame:
     """Return the table ``residual_map``: the mean residual of each sensor in each grid cell of each face."""
-    rows: list[pd.DataFrame] = []
+    rows: list[dict[str, Any]] = []
     for sensor in SENSORS:
         of_sensor = residuals[residuals["sensor"] == sensor]
+        positions = of_sensor[[f"{axis}_target_m" for axis in "xyz"]].to_numpy(np.float64)
+        residual_m, weight = (of_sensor[name].to_numpy(np.float64) for name in ("residual_m", "weight"))
+        face_number = of_sensor["face"].to_numpy()
+        by_face = np.argsort(face_number, kind="stable")
         for face in faces.to_dict("records"):
-            points = of_sensor[of_sensor["face"] == face["face"]]
-            normal = normal_of(face)
-            positions = points[[f"{axis}_target_m" for axis in "xyz"]].to_numpy(np.float64)
-            cells = cells_on_face(positions, normal, CELL_M)
-            bins = _binned(points, cells[:, 0], cells[:, 1])
+            ends = (np.searchsorted(face_number, face["face"], side, by_face) for side in ("left", "right"))
+            points, normal = by_face[slice(*ends)], normal_of(face)
+            cells = cells_on_face(positions[points], normal, CELL_M)
+            bins = bin_statistics(cells, residual_m[points], weight[points])
             centres = cell_centres(bins.keys, normal, float(face["distance_m"]), CELL_M).reshape(-1, 3)
             centre_columns = {f"{axis}_target_m": centres[:, k] for k, axis in enumerate("xyz")}
-            number = {"sensor": sensor, "face": np.full(len(centres), face["face"], dtype=np.int16)}
-            rows.append(pd.DataFrame(number | centre_columns | {"size_m": CELL_M} | _columns(bins)))
-    return pd.concat(rows, ignore_index=True)
+            number = np.full(len(centres), face["face"], dtype=np.int16)
+            rows.append({"sensor": np.full(len(centres), sensor, dtype=object), "face": number, **centre_columns})
+            rows[-1] |= {"size_m": np.full(len(centres), CELL_M), **_columns(bins)}
+    return pd.DataFrame({name: np.concatenate([row[name] for row in rows]) for name in rows[0]})
 
 
 def _binned(points: pd.DataFrame, *keys: Any) -> BinStatistics:

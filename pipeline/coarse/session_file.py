@@ -17,7 +17,7 @@ from pipeline.config.fill_in import is_unfilled, refuse_unfilled
 from pipeline.config.instruments import merge_presets
 from pipeline.config.load import session_yaml
 from pipeline.config.session import SessionConfig
-from pipeline.config.yaml_file import content_of, text_of
+from pipeline.config.yaml_file import YamlFile, content_of
 from pipeline.config.yaml_models import parse
 from pipeline.maths.mount_parameters import SETTINGS
 from pipeline.mount import Mounted
@@ -35,12 +35,11 @@ def read_session(folder: Path) -> tuple[str, Content]:
 
     A mount that is still to be filled in counts as missing, and is not in the content.
     """
-    path = session_yaml(folder)
-    text = text_of(path)
-    content = _without_unfilled_mounts(content_of(text, path))
-    refuse_unfilled({path: text}, may_be=lambda one: one.block in MOUNTS or one.key in MOUNTS)
+    file = YamlFile.read(session_yaml(folder))
+    content = _without_unfilled_mounts(file.content)
+    refuse_unfilled([file], may_be=lambda one: one.block in MOUNTS or one.key in MOUNTS)
     _check(content, folder)
-    return text, content
+    return file.text, content
 
 
 def _without_unfilled_mounts(content: Content) -> Content:

@@ -1,6 +1,6 @@
 """Values that a person must still fill in. ``poolcal init`` marks them, and no command takes the mark for a value."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
@@ -8,7 +8,7 @@ from typing import Any
 
 import yaml
 
-from pipeline.config.yaml_file import compose, content_of, text_of
+from pipeline.config.yaml_file import YamlFile, compose
 from pipeline.errors import ConfigError
 
 MARK = "FILL_IN"
@@ -91,17 +91,17 @@ def is_unfilled(value: Any) -> bool:
     return MARK in (value.values() if isinstance(value, dict) else [value] if isinstance(value, str) else [])
 
 
-def refuse_unfilled(texts: Mapping[Path, str], may_be: Callable[[Unfilled], bool] = lambda _: False) -> None:
+def refuse_unfilled(files: Iterable[YamlFile], may_be: Callable[[Unfilled], bool] = lambda _: False) -> None:
     """Raise a ConfigError, one line, that names all keys still to be filled in, with their lines and their meaning.
 
     Parameters
     ----------
-    texts
-        The texts of YAML files, by their paths.
+    files
+        The YAML files.
     may_be
         Whether a key may be left as it is, because the command fills it in.
     """
-    missing = {path: [one for one in unfilled(text, path) if not may_be(one)] for path, text in texts.items()}
+    missing = {file.path: [one for one in unfilled(file.text, file.path) if not may_be(one)] for file in files}
     named = {path: listed(keys) for path, keys in missing.items() if keys}
     if named:
         head = f"still to be filled in, in place of {MARK}"
@@ -122,11 +122,3 @@ def _of(block: str, keys: list[Unfilled]) -> Iterator[str]:
     for one in keys:
         words = what(one.key)
         yield f"line {one.line} {one.key}" + (f" ({words})" if words else "")
-
-
-def read_filled(path: Path) -> dict[str, Any]:
-    """Return the mapping in a YAML file of which nothing is still to be filled in."""
-    text = text_of(path)
-    content = content_of(text, path)
-    refuse_unfilled({path: text})
-    return content

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from pipeline.config.quantities import PRINTABLE, Model
 from pipeline.config.session import Calibrated
-from pipeline.config.yaml_file import compose, content_of, line_of, text_of
+from pipeline.config.yaml_file import YamlFile, compose, line_of
 from pipeline.config.yaml_models import parse
 from pipeline.errors import ConfigError
 
@@ -63,7 +63,6 @@ class FleetFile:
 
 def load_fleet(path: Path) -> FleetFile:
     """Return the list of sessions, checked; the folders that it names are not looked at."""
-    text = text_of(path)
-    content = content_of(text, path)
-    root = compose(text, path)
-    return FleetFile(path, parse(Fleet, content, str(path), root), root)
+    file = YamlFile.read(path)
+    root = compose(file.text, path)
+    return FleetFile(path, parse(Fleet, file.content, str(path), root), root)

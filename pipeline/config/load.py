@@ -2,28 +2,35 @@
 
 import os
 import shlex
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from pipeline.config.fill_in import read_filled, refuse_unfilled
+from pipeline.config.fill_in import refuse_unfilled
 from pipeline.config.instruments import dotted_keys, merge_presets
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import SessionConfig
 from pipeline.config.target_mesh import with_mesh
-from pipeline.config.yaml_file import SESSION_YAML, content_of, text_of
+from pipeline.config.yaml_file import SESSION_YAML, YamlFile
 from pipeline.config.yaml_models import parse
 from pipeline.errors import ConfigError
+
+WithCast = Callable[[dict[str, Any], Path], dict[str, Any]]
 
 
 def load_pool(path: Path) -> PoolConfig:
     """Return the pool's config, checked."""
-    text = text_of(path)
-    content = content_of(text, path)
-    if "target" not in content and {"ins", "laser"} & content.keys():
-        raise ConfigError(f"{path}: is a session's file; --config wants the pool's, which says where the target is")
-    refuse_unfilled({path: text})
-    return parse(PoolConfig, with_mesh(content, path), str(path))
+    return pool_in(YamlFile.read(path))
+
+
+def pool_in(file: YamlFile) -> PoolConfig:
+    """Return the config in a pool's file, checked."""
+    if "target" not in file.content and {"ins", "laser"} & file.content.keys():
+        raise ConfigError(
+            f"{file.path}: is a session's file; --config wants the pool's, which says where the target is"
+        )
+    refuse_unfilled([file])
+    return parse(PoolConfig, with_mesh(file.content, file.path), str(file.path))
 
 
 def session_yaml(folder: Path) -> Path:
@@ -38,15 +45,18 @@ def session_yaml(folder: Path) -> Path:
     return path
 
 
-def load_session(
-    folder: Path, with_cast: Callable[[dict[str, Any], Path], dict[str, Any]] | None = None
-) -> SessionConfig:
-    """Return the session's config, checked.
+def load_session(folder: Path, with_cast: WithCast | None = None) -> SessionConfig:
+    """Return the session's config, checked; as :func:`session_in`, from the session folder."""
+    return session_in(YamlFile.read(session_yaml(folder)), with_cast)
+
+
+def session_in(file: YamlFile, with_cast: WithCast | None = None) -> SessionConfig:
+    """Return the config in session.yaml, checked.
 
     Parameters
     ----------
-    folder : Path
-        The session folder.
+    file : YamlFile
+        session.yaml in its session folder.
     with_cast : Callable, optional
         Function that replaces the name of a cast's file by the cast, in the content of session.yaml. It stands in
         readers/casts.py, which no module of config may import. A session that names such a file cannot be loaded
@@ -57,21 +67,22 @@ def load_session(
     ConfigError
         session.yaml, or a preset that it names, has a fault. The message is one line.
     """
-    path = session_yaml(folder)
-    content, own_keys = merge_presets(read_filled(path), folder)
+    refuse_unfilled([file])
+    folder = file.path.parent
+    content, own_keys = merge_presets(file.content, folder)
     content = content if with_cast is None else with_cast(content, folder)
     ins = content.get("ins")
     if isinstance(ins, dict) and "drift" in ins and "ins.drift" not in own_keys:
         # The drift comes from a preset: sigmas in the INS files take precedence over it.
         content = content | {"ins": {"drift_from": "files"} | ins}
-    return parse(SessionConfig, {"name": folder.resolve().name[:300] or "session"} | content, str(path))
+    return parse(SessionConfig, {"name": folder.resolve().name[:300] or "session"} | content, str(file.path))
 
 
-def stated_keys(path: Path) -> tuple[str, ...]:
-    """Return the dotted keys to which a YAML file itself gives a value (``ins.drift.heading_deg``), in its order.
+def stated_keys(content: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the dotted keys that a YAML file's content states itself (``ins.drift.heading_deg``), in its order.
 
     A block's own key is none of them, nor are keys below ``about``, from which nothing is computed.
     """
-    keys = list(dotted_keys(content_of(text_of(path), path)))
+    keys = list(dotted_keys(content))
     blocks = {key.rpartition(".")[0] for key in keys}
     return tuple(key for key in keys if key not in blocks and key.partition(".")[0] != "about")

@@ -1,6 +1,8 @@
 """Strict reading of a YAML file. Every failure is an error of one line that names the file."""
 
+import hashlib
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -52,9 +54,29 @@ class _StrictLoader(Composer, yaml.CSafeLoader):
 _StrictLoader.add_constructor("tag:yaml.org,2002:int", _StrictLoader.construct_yaml_int)
 
 
+@dataclass(frozen=True)
+class YamlFile:
+    """A YAML file as it was at one moment: it is read once, so that text, content and digest are of one state."""
+
+    path: Path
+    text: str
+    content: dict[str, Any]
+
+    @classmethod
+    def read(cls, path: Path) -> "YamlFile":
+        """Read a file; raise ConfigError on every failure."""
+        text = text_of(path)
+        return cls(path, text, content_of(text, path))
+
+    @property
+    def sha256(self) -> str:
+        """The SHA-256 of the file's bytes. Strict UTF-8 gives the same bytes back."""
+        return hashlib.sha256(self.text.encode()).hexdigest()
+
+
 def read_yaml(path: Path) -> dict[str, Any]:
     """Return the mapping in a YAML file; raise ConfigError on every failure."""
-    return content_of(text_of(path), path)
+    return YamlFile.read(path).content
 
 
 def text_of(path: Path) -> str:

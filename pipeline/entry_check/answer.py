@@ -23,6 +23,7 @@ from pipeline.entry_check.run_soundings import EntrySource
 from pipeline.entry_check.ways import EACH_VALUE, PLAIN, Way, ways_of
 
 Array = NDArray[np.float64]
+EVEN = 0.5  # least evenness with which nothing is missing
 WORSE = 0.02  # a way whose variance is larger than the least by this share of it, by WORSE_M squared,
 WORSE_M, WORSE_OF_EXCESS = 0.0003, 3.0  # and by so many times what no way explains, is out of question
 
@@ -90,7 +91,7 @@ def answer_of(pairs: Pairs, source: EntrySource, heights_differ: bool, rounding_
     R, lever = source.total.R_body_from_sensor, source.total.lever_arm_body_m
     turned = judge.turned_attitudes(R) if explanations[0].keys[2] == ATTITUDES else np.eye(3)
     return Answer(
-        verdict=_verdict(explanations, judge.proves(turned @ R, turned @ lever)),
+        verdict=_verdict(explanations, pairs.evenness >= EVEN and judge.proves(turned @ R, turned @ lever)),
         way=judge.way,
         explanations=explanations,
         angle_deg=float(np.abs(judge.turn_deg(R)).max()),

@@ -16,12 +16,10 @@ from pipeline.results.finished_run import FinishedRun
 class EntryCheck:
     """What was compared, and the answer."""
 
-    path: Path
     run: RunSide
     source: EntrySource
     file: FileSide
     pairs: Pairs
-    heights_differ: bool
     answer: Answer
 
 
@@ -47,7 +45,7 @@ def check_entry(run: FinishedRun, path: Path, crs: str | None, other_heights: bo
         raise RawDataError(_not_found(path, file))
     heights_differ = other_heights or file.depths or pairs.negated or file.placing.geoid is not None
     answer = answer_of(pairs, source, heights_differ, file.points.rounding_m)
-    return EntryCheck(path, side, source, file, pairs, heights_differ, answer)
+    return EntryCheck(side, source, file, pairs, answer)
 
 
 def _not_found(path: Path, file: FileSide) -> str:

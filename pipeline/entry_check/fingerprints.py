@@ -26,7 +26,7 @@ COARSE_M = 0.002
 LAGS = (1, 2, 3, 4)
 MOST_QUERIES, MOST_WIDE_QUERIES = 20_000, 40_000
 TRIALS, DRAWN = 400, 3  # windows of a trial
-CLOSE_M = 0.15  # a window that a trial explains; a height reference that is wrong by 10 m tilts it by so much
+CLOSE_M = 0.15  # windows that a mount explains; a height reference that is wrong by 10 m tilts them by so much
 LEAST_WINDOWS = 8
 DELAYS_S = (0.0, 0.5, -0.5, 1.0, -1.0, 2.0, -2.0, 18.0, -18.0, 19.0, -19.0, 37.0, -37.0)  # GPS, UTC, TAI; whole seconds
 DELAY_TRIED = 1500  # soundings
@@ -115,6 +115,8 @@ def _by_order(soundings: RunSoundings, file: FilePoints, windows: Windows) -> Ma
         late = [(fit_mount(run, one.points_m[there], free, s), one) for one in _signs(file) for s in DELAYS_S]
         better = min(late, key=lambda one: one[0].scatter_m)
         fitted, points = better if better[0].scatter_m < LESS * fitted.scatter_m else (fitted, points)
+    if fitted.scatter_m > CLOSE_M:
+        return None
     return Matches(own, other, points is not file, fitted, True)
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from pipeline.entry_check.fingerprints import FilePoints, matched
+from pipeline.entry_check.leave_one_out import time_groups
 from pipeline.entry_check.mount_fit import FREE_ALL, SIZE, FittedMount, fit_mount
 from pipeline.entry_check.run_soundings import RunSoundings
 from pipeline.mount import Mounted
@@ -28,7 +29,7 @@ PROBE_M = np.array([[0.31, 0.0, 0.0], [0.0, 0.31, 0.0], [0.0, 0.0, 0.31], [-0.23
 LEAST_PAIRS = 60
 LEAST_SHARE, ABOVE_CHANCE = 0.01, 8.0  # of the run's soundings found again, and by what chance would find;
 MOST, MOST_ABOVE_CHANCE = 0.4, 2.0  # or so many, where a file with rounded coordinates is met by chance often
-WELL_ORDERED = 0.3  # of the run's soundings in pairs that the order proves: no more are needed
+WELL_ORDERED = 1000  # soundings in pairs that the order proves: no more are needed
 FITTED = 4000  # pairs of each step before the last
 LEVEL_SEARCH_M = 0.01  # horizontal distance of the points whose heights are compared
 LEVEL_BIN_M = 0.01
@@ -56,6 +57,9 @@ class Pairs:
         "order" (of pings and beams in the file) or "places".
     delay_s
         By how much the software's poses are late, roughly.
+    evenness
+        Of pairs by places: least share of a pass (or a part) that was found, by the largest. What stands elsewhere is
+        not found at all; pairs by order are found wherever they stand.
     """
 
     soundings: RunSoundings
@@ -66,6 +70,7 @@ class Pairs:
     negated: bool
     how: str
     delay_s: float = 0.0
+    evenness: float = 1.0
 
 
 def identify(soundings: RunSoundings, file: FilePoints, starts: Sequence[Mounted]) -> Pairs | None:
@@ -80,26 +85,32 @@ def identify(soundings: RunSoundings, file: FilePoints, starts: Sequence[Mounted
     starts
         Mounts that may have been entered, the likeliest first.
     """
+    return (
+        from_fingerprints(soundings, file)
+        or from_places(soundings, file, starts, negated=False)
+        or from_places(soundings, file.with_depths(), starts, negated=True)
+    )
+
+
+def from_fingerprints(soundings: RunSoundings, file: FilePoints) -> Pairs | None:
+    """Return the pairs by distances within pings and by the file's order; None if these tell nothing."""
     found = matched(soundings, file)
-    if found is not None:
-        turned = file.with_depths() if found.negated else file
-        share = len(found.own) / len(soundings.t_ns)
-        points = turned.points_m[found.other]
-        in_order = Pairs(
-            soundings.rows(found.own), points, len(found.own), share, 0.0, found.negated, "order", found.fitted.delay_s
-        )
-        if found.in_order and share >= WELL_ORDERED:
-            return in_order
-        pairs = _refined(soundings, turned, found.fitted, Way(found.negated, "order", GATES_M))
-        if pairs is not None:
-            return pairs
-        if found.in_order:
-            return in_order
-    both = (_from_places(soundings, turned, starts, turned is not file) for turned in (file, file.with_depths()))
-    return next((pairs for pairs in both if pairs is not None), None)
+    if found is None:
+        return None
+    turned = file.with_depths() if found.negated else file
+    number, points = len(np.unique(found.own)), turned.points_m[found.other]
+    in_order = Pairs(
+        soundings.rows(found.own), points, number, number / len(soundings.t_ns), 0.0, found.negated, "order",
+        found.fitted.delay_s,
+    )  # fmt: skip
+    if found.in_order and number >= WELL_ORDERED:
+        return in_order
+    pairs = _refined(soundings, turned, found.fitted, Way(found.negated, "order", GATES_M))
+    return pairs or (in_order if found.in_order else None)
 
 
-def _from_places(soundings: RunSoundings, file: FilePoints, starts: Sequence[Mounted], negated: bool) -> Pairs | None:
+def from_places(soundings: RunSoundings, file: FilePoints, starts: Sequence[Mounted], negated: bool) -> Pairs | None:
+    """Return the pairs that are near each other by the best start; None if no start finds more than chance."""
     some = soundings.rows(np.linspace(0, len(soundings.t_ns) - 1, TRIED).astype(int))
     tree, level = cKDTree(file.points_m), cKDTree(file.points_m[:, :2])
     gate = TRIED_GATE_M + 1.8 * file.rounding_m
@@ -169,8 +180,15 @@ def _refined(soundings: RunSoundings, file: FilePoints, fitted: FittedMount, way
     if len(own) < LEAST_PAIRS or not clear:
         return None
     return Pairs(
-        soundings.rows(own), file.points_m[other], len(own), share, by_chance, way.negated, way.how, fitted.delay_s
-    )
+        soundings.rows(own), file.points_m[other], len(own), share, by_chance, way.negated, way.how, fitted.delay_s,
+        _evenness(soundings, own),
+    )  # fmt: skip
+
+
+def _evenness(soundings: RunSoundings, own: Integers) -> float:
+    group = time_groups(soundings.t_ns)
+    shares = np.bincount(group[own], minlength=group.max() + 1) / np.bincount(group)
+    return float(shares.min() / shares.max())
 
 
 def _nearest(tree: cKDTree, predicted: Array, gate_m: float) -> tuple[Integers, Integers]:

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from pipeline.entry_check.ways import Way
 from pipeline.maths.geometry.rotations import rotation_error
+from pipeline.mount import Mounted
 
 Array = NDArray[np.float64]
 TOLERANCE_DEG, TOLERANCE_M = 0.01, 0.005
@@ -14,6 +15,7 @@ NAMED_DEG = 0.006  # of a mistake with known numbers: they were rounded to 0.01 
 SIGMAS = 3.0
 SPARE, SPARE_M = 1.3, 0.0005  # variance of the rounding by this factor, and this squared, are no excess
 HIDDEN = 3.0  # a mount may be wrong by so many times the excess without being noticed
+MOST_Z_M = 0.1  # three sigmas of z where any height will do
 MOST_EXCESS_M = TOLERANCE_M / 2  # beyond, nothing is called right
 CLEARLY = 3.0
 
@@ -35,10 +37,15 @@ class Judge:
     @classmethod
     def of(cls, way: Way, rounding_m: float, range_m: float) -> "Judge":
         """Return the judge of a way; ``range_m``: of most soundings."""
-        excess_m = excess_of(way.fitted.scatter_m, rounding_m)
+        excess_m = excess_of(max(way.fitted.scatter_m, way.fitted.left_out_m), rounding_m)
         sigma = np.sqrt(np.diag(way.fitted.covariance))
         angles = SIGMAS * sigma[:3] + HIDDEN * excess_m / range_m
         return cls(way, np.degrees(angles), SIGMAS * sigma[3:6] + HIDDEN * excess_m, excess_m)
+
+    @property
+    def mount(self) -> Mounted:
+        """The found mount."""
+        return Mounted(self.way.fitted.R_body_from_mbes, self.way.fitted.lever_arm_m)
 
     def turn_deg(self, R: Array) -> Array:
         """Return the rotation vector (3,) from a rotation to the found one, degrees, body axes."""
@@ -65,11 +72,11 @@ class Judge:
         return bool(np.any(off > CLEARLY * allowed))
 
     def proves(self, R: Array, lever_arm_m: Array) -> bool:
-        """Whether it is certain that a mount was entered; z is not asked if any height will do."""
+        """Whether it is certain that a mount was entered; z is known within MOST_Z_M if any height will do."""
         angle = float(np.abs(self.turn_deg(R)).max())
         sigma = SIGMAS * np.sqrt(np.diag(self.way.fitted.covariance))[:6]
         off = np.abs(self.way.fitted.lever_arm_m - lever_arm_m)
-        asked = 2 if self.way.any_height else 3
-        near = angle <= TOLERANCE_DEG and bool((off[:asked] <= TOLERANCE_M).all())
-        close = np.degrees(sigma[:3].max()) <= TOLERANCE_DEG and bool((sigma[3 : 3 + asked] <= TOLERANCE_M).all())
+        most = np.array([TOLERANCE_M, TOLERANCE_M, MOST_Z_M if self.way.any_height else TOLERANCE_M])
+        near = angle <= TOLERANCE_DEG and bool((off <= most).all())
+        close = np.degrees(sigma[:3].max()) <= TOLERANCE_DEG and bool((sigma[3:] <= most).all())
         return near and bool(close) and self.excess_m <= MOST_EXCESS_M

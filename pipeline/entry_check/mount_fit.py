@@ -11,9 +11,12 @@ linear in t and s, and by R = Exp(ε) R_before linear in ε: ∂b/∂ε = -skew(
 start is the rotation that turns the points x best onto b (Kabsch 1976; Wahba's problem), and Gauss-Newton steps follow.
 Where the boat keeps one heading, t and s can hardly be told apart: a weak prior of 0 on s leaves it in t.
 
-The covariance is the larger of two: that of residuals which have a common error within a second (Liang and Zeger 1986),
-and that of the leave-one-out of whole passes (:mod:`pipeline.entry_check.leave_one_out`), which also sees rays and
-positions that differ from pass to pass.
+The variances are the largest of three: those of residuals which have a common error within a second (Liang and Zeger
+1986); those of the leave-one-out of whole passes (:mod:`pipeline.entry_check.leave_one_out`), which also sees rays and
+positions that differ from pass to pass; and σ² N⁻¹, which alone grows where seconds and passes are too few.
+
+Pairs that the robust weights leave out may have been placed with another mount than the rest, such as those of a pass
+that was processed before the values were entered. Their scatter is told apart.
 """
 
 from dataclasses import dataclass
@@ -30,6 +33,9 @@ MAX_STEPS = 12
 ENDED = 1e-9  # rad and m: a smaller step is the last
 CUT = 4.0  # residuals beyond this number of robust sigmas get no weight (Tukey's function)
 CLUSTER_S = 1.0  # residuals within it may have a common error
+OF_SIGMA = 1.538  # median length of a vector whose three coordinates have the sigma 1
+LEAST_LEFT_OUT, LEAST_PINGS = 0.02, 10  # share and pings of pairs without weight that are asked for another mount
+WEAKEST = 1e-14  # eigenvalue of N by its largest: below lies rounding alone
 NAMES = ("rx", "ry", "rz", "x", "y", "z", "shift_x", "shift_y", "shift_z", "k", "delay")
 SIZE = len(NAMES)
 LOOSE_M = 1e3  # of the weak prior, against a millimetre of each point
@@ -62,6 +68,8 @@ class FittedMount:
         Root of the mean squared residual of one coordinate, robust weights.
     weight
         (n,) robust weights of the pairs.
+    left_out_m
+        The same scatter of pairs that the weights leave out, and that another mount explains; 0: there are none.
     """
 
     R_body_from_mbes: Array
@@ -72,6 +80,7 @@ class FittedMount:
     scatter_m: float
     weight: Array
     delay_s: float = 0.0
+    left_out_m: float = 0.0
 
     def predicted(self, soundings: RunSoundings) -> Array:
         """Return where the software places soundings, (n, 3) m, pool frame."""
@@ -134,8 +143,9 @@ def fit_mount(
             soundings = recorded.later(d)
             b = soundings.in_body(points_pool_m)
     covariance = np.zeros((SIZE, SIZE))
-    covariance[np.ix_(used, used)] = _covariance(design, weight, residual, normal, recorded.t_ns)
-    return FittedMount(R, t, s, k, covariance, float(np.sqrt(variance)), weight, d)
+    covariance[np.ix_(used, used)] = _covariance(design, weight, residual, normal, recorded.t_ns, variance)
+    left_out_m = _left_out_m(x, b, residual, weight, recorded.t_ns)
+    return FittedMount(R, t, s, k, covariance, float(np.sqrt(variance)), weight, d, left_out_m)
 
 
 def fit_delay(soundings: RunSoundings, points_pool_m: Array, names: tuple[str, ...], delay_s: float) -> FittedMount:
@@ -169,19 +179,50 @@ def _design(turned: Array, back: Array, by_delay: Array) -> Array:
 
 
 def _tukey(lengths: Array) -> Array:
-    """Return weights (n,), 0 beyond CUT robust sigmas: the median length of a vector is 1.54 sigmas of a coordinate."""
-    limit = CUT * max(float(np.median(lengths)) / 1.538, 1e-6) * np.sqrt(3)
+    """Return weights (n,), 0 beyond CUT robust sigmas."""
+    limit = CUT * max(float(np.median(lengths)) / OF_SIGMA, 1e-6) * np.sqrt(3)
     return np.asarray(np.maximum(1 - (lengths / limit) ** 2, 0.0) ** 2)
 
 
-def _covariance(design: Array, weight: Array, residual: Array, normal: Array, t_ns: NDArray[np.int64]) -> Array:
-    """Return N⁻¹ (Σ g gᵀ) N⁻¹, with g the sums of Aᵀ w r over each CLUSTER_S, widened where passes differ by more."""
+def _left_out_m(x: Array, b: Array, residual: Array, weight: Array, t_ns: NDArray[np.int64]) -> float:
+    """Return the scatter of a coordinate of the pairs without weight, if another mount explains them; else 0.
+
+    Wrong pairs and outliers are not explained by any. Their scatter has to fall to less than half.
+
+    Parameters
+    ----------
+    x, b, residual, weight, t_ns
+        Of n pairs, as in :func:`fit_mount`.
+    """
+    rows = weight == 0
+    if rows.mean() < LEAST_LEFT_OUT or len(np.unique(t_ns[rows])) < LEAST_PINGS:
+        return 0.0
+    lengths, some = np.zeros(rows.sum()), np.ones(rows.sum())
+    for _ in range(MAX_STEPS):
+        R, t = best_rotation(x[rows], b[rows], some)
+        lengths = np.linalg.norm(b[rows] - x[rows] @ R.T - t, axis=1)
+        some = _tukey(lengths)
+    left_m = float(np.median(np.linalg.norm(residual[rows], axis=1)))
+    return left_m / OF_SIGMA if np.median(lengths) < left_m / 2 else 0.0
+
+
+def _covariance(
+    design: Array,
+    weight: Array,
+    residual: Array,
+    normal: Array,
+    t_ns: NDArray[np.int64],
+    variance: float,
+) -> Array:
+    """Return N⁻¹ (Σ g gᵀ) N⁻¹, with g the sums of Aᵀ w r over each CLUSTER_S, and not less than the two others."""
     scores = np.einsum("nik,n,ni->nk", design, weight, residual, optimize=True)
     seconds = np.unique(t_ns // round(CLUSTER_S * NS_PER_S), return_inverse=True)[1]
     sums = np.stack([np.bincount(seconds, column) for column in scores.T], axis=1)
-    inverse = np.linalg.pinv(normal, rcond=1e-14, hermitian=True)
+    values, vectors = np.linalg.eigh(normal)
+    inverse = vectors / np.maximum(values, WEAKEST * values[-1]) @ vectors.T
     covariance = inverse @ (sums.T @ sums) @ inverse * len(sums) / max(len(sums) - 1, 1)
+    formal = max(variance, 1e-12) * np.diag(inverse)
+    covariance += np.diag(np.maximum(formal - np.diag(covariance), 0.0))
     between = leave_one_out(design, weight, scores, normal, time_groups(t_ns))
-    least = np.maximum(np.diag(covariance), 1e-30)
-    wider = np.sqrt(np.maximum(between / least, 1.0))
+    wider = np.sqrt(np.maximum(between / np.diag(covariance), 1.0))
     return np.asarray(covariance * wider[:, None] * wider)

@@ -16,6 +16,7 @@ from pipeline.entry_check.run_soundings import RunSoundings
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 LEAST_ORDERED, ORDERED = 30, 4.0  # windows in order; of the root of all
+MOST_SERIES = 100  # of windows in order
 STRETCH = 0.003  # other rays and another sound speed change distances by this share
 
 
@@ -41,11 +42,20 @@ class Windows:
 
 
 def in_order(windows: Windows) -> Windows | None:
-    """Return the windows that stand in the file as in the run, or all backwards; None if they are too few."""
+    """Return the windows that stand in the file as in the run, or backwards; None if they are too few.
+
+    Passes that the file has in another order are one series each: what is left is searched until there is none.
+    """
     windows = windows.some(np.argsort(windows.file_rows[:, 0], kind="stable"))
-    first = windows.run_rows[:, 0]
-    best = max((longest_rise(values) for values in (first, -first)), key=len)
-    return windows.some(best) if len(best) >= max(LEAST_ORDERED, ORDERED * np.sqrt(len(first))) else None
+    left, first = np.arange(len(windows.run_rows)), windows.run_rows[:, 0]
+    found: list[Integers] = []
+    while len(left) >= LEAST_ORDERED and len(found) < MOST_SERIES:
+        best = max((longest_rise(values) for values in (first[left], -first[left])), key=len)
+        if len(best) < max(LEAST_ORDERED, ORDERED * np.sqrt(len(left))):
+            break
+        found.append(left[best])
+        left = np.delete(left, best)
+    return windows.some(np.sort(np.concatenate(found))) if found else None
 
 
 def longest_rise(values: Integers) -> Integers:
@@ -71,7 +81,7 @@ def whole_pings(
     """Return pairs (2, m) of all beams of the windows' pings, soundings and points; and which share of the tried is so.
 
     From a window on, each beam stands one row further in the file, as long as none was taken out. A pair counts if it
-    is as far from the window's two ends on both sides.
+    is as far from the window's two ends on both sides. A sounding that the file holds twice has two pairs.
 
     Parameters
     ----------
@@ -101,5 +111,4 @@ def whole_pings(
         here = np.linalg.norm(points_m[other] - points_m[end_other[window]], axis=1)
         good &= np.abs(there - here) <= limit_m + STRETCH * there
     share = float(good.mean()) if len(good) else 0.0
-    own, place = np.unique(own[good], return_index=True)
-    return np.stack([own, other[good][place]]), share
+    return np.unique(np.stack([own[good], other[good]]), axis=1), share

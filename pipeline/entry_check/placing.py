@@ -7,7 +7,7 @@ points, which the answer shows.
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 
 import numpy as np
@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 GEOGRAPHIC = "EPSG:4979"
 NEAR_M = 20_000.0  # a guessed CRS places the points within this of the target
 MOST_HINTS = 3
+LONGEST_NAME = 40  # letters; a longer one is a whole definition (WKT, PROJ)
 SOME = 1000  # coordinates with which a CRS is tried
 
 
@@ -62,8 +63,8 @@ class Placing:
             return frame.points_from_ecef(np.stack(ecef, axis=1))
 
 
-def placing_of(name: str, side: RunSide, swapped: bool = False) -> Placing:
-    """Return the placing by a CRS; raise ConfigError if it cannot be used."""
+def placing_of(name: str, side: RunSide) -> Placing:
+    """Return the placing by a CRS, x east or longitude first; raise ConfigError if it cannot be used."""
     from pyproj import CRS, Proj
     from pyproj.exceptions import ProjError
 
@@ -75,10 +76,10 @@ def placing_of(name: str, side: RunSide, swapped: bool = False) -> Placing:
         level = horizontal_part(crs)
         factors = Proj(level).get_factors(side.longitude_deg, side.latitude_deg) if level.is_projected else None
         return Placing(
-            name=name,
+            name=name if len(name) < LONGEST_NAME else ":".join(crs.to_authority() or ("as the file says",)),
             title=crs.name,
             to_ecef=None if level.is_geocentric else ecef_function(level),
-            swapped=swapped,
+            swapped=False,
             geoid=height_system(crs),
             geographic=level.is_geographic,
             convergence_rad=0.0 if factors is None else float(np.radians(factors.meridian_convergence)),
@@ -107,7 +108,7 @@ def guessed(coordinates: Array, side: RunSide, geographic: bool | None) -> Placi
     """Return the placing that brings the points nearest to the target, by degrees, UTM or ECEF; None: none does."""
     coordinates = coordinates[:: max(1, len(coordinates) // SOME)]
     names = [GEOGRAPHIC] if geographic else [GEOGRAPHIC, utm_of(side), ECEF]
-    tried = [placing_of(name, side, swapped) for name in names for swapped in (False, True)]
+    tried = [placing for name in names for placing in _both_orders(name, side)]
     best = min(tried, key=lambda placing: distance_m(placing, coordinates, side))
     return best if distance_m(best, coordinates, side) < NEAR_M else None
 
@@ -131,8 +132,12 @@ def hints(coordinates: Array, side: RunSide, within_m: float) -> list[Placing]:
 
 def _fitting(names: Sequence[str], coordinates: Array, side: RunSide, within_m: float) -> Iterator[Placing]:
     for name in names:
-        for swapped in (False, True):
-            with suppress(ConfigError):
-                placing = placing_of(name, side, swapped)
+        with suppress(ConfigError):
+            for placing in _both_orders(name, side):
                 if distance_m(placing, coordinates, side) < within_m:
                     yield placing
+
+
+def _both_orders(name: str, side: RunSide) -> tuple[Placing, Placing]:
+    east_first = placing_of(name, side)
+    return east_first, replace(east_first, swapped=True)

@@ -20,7 +20,8 @@ from pipeline.run.results import Tables
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-MOST_SOUNDINGS = 30_000  # more do not make the answer better, only later
+MOST_SOUNDINGS = 30_000  # more do not make the answer better, only later;
+LEAST_SHARE = 0.01  # but so many of all: less would hardly meet the file's, which are thinned as well
 NS_PER_S = 1e9
 
 
@@ -143,13 +144,15 @@ def run_side(run: FinishedRun) -> RunSide:
 
 
 def _whole_pings(tables: Tables, names: tuple[str, ...]) -> Mapping[str, Any]:
-    """Return columns of about MOST_SOUNDINGS soundings, all of every n-th ping: their beams are neighbours."""
-    times = [batch["t_ns"] for batch in tables.stream(SOUNDINGS_POOL, "t_ns").batches()]
-    if not times:
+    """Return columns of some soundings, all of every n-th ping: their beams are neighbours."""
+    count, times = 0, []
+    for batch in tables.stream(SOUNDINGS_POOL, "t_ns").batches():
+        count += len(batch["t_ns"])
+        times.append(np.unique(batch["t_ns"]))
+    if not count:
         raise ArtefactError(f"{tables.run}: holds no soundings near the target; run poolcal run again")
-    pings = np.unique(np.concatenate(times))
-    every = max(1, -(-sum(map(len, times)) // MOST_SOUNDINGS))
-    wanted = pings[::every]
+    every = max(1, min(-(-count // MOST_SOUNDINGS), round(1 / LEAST_SHARE)))
+    wanted = np.unique(np.concatenate(times))[::every]
     kept = []
     for batch in tables.stream(SOUNDINGS_POOL, *names).batches():
         rows = np.isin(batch["t_ns"], wanted)

@@ -15,7 +15,7 @@ from pipeline.errors import RawDataError
 from pipeline.readers.crs import DEGREE_M
 from pipeline.readers.detect import kind_of
 from pipeline.readers.exported import text_layout, text_points
-from pipeline.readers.file_kind import CSV, FLOAT32_TEXT, GSF, LAS, TEXT, TRAJECTORY_TEXT
+from pipeline.readers.file_kind import GSF, LAS
 from pipeline.readers.gsf_places import POSITION_STEP_M, gsf_points
 from pipeline.readers.las import crs_of_las, las_points
 from pipeline.readers.las_header import read_header
@@ -29,9 +29,9 @@ MOST_POINTS = 600_000  # of the file, near the track; beyond, every other block 
 BLOCK_ROWS = 512
 MARGIN_M = 10.0  # by how much a lever arm may be wrong
 LEAST_POINTS = 60
+SOFTWARE = slice(58, 90)  # bytes of a LAS file with its generating software
 COARSEST_M = 0.1
 GRID_STEP_M, GRID_ROUNDING = 0.04, 0.1  # least cell of a grid; of multiples of the cell, as a share of it
-TEXTS = (CSV, TEXT, FLOAT32_TEXT, TRAJECTORY_TEXT)
 
 
 @dataclass(frozen=True)
@@ -92,9 +92,20 @@ def opened_source(path: Path) -> Source:
     if kind is GSF:
         return Source(gsf_points(path), GEOGRAPHIC, True, POSITION_STEP_M, depths=True)
     if kind is LAS:
+        if _is_written_here(path):
+            raise RawDataError(
+                f"{path}: is a cloud of poolcal export, which proves nothing of another program; export the soundings "
+                "from that program"
+            )
         return Source(_las(path), crs_of_las(path, str(path)))
     layout = text_layout(path)
     return Source(text_points(path, layout), geographic=layout.geographic, depths=layout.depths)
+
+
+def _is_written_here(path: Path) -> bool:
+    """Whether a LAS file names poolcal as the generating software."""
+    with opened(path, str(path)) as file:
+        return file.read(SOFTWARE.stop)[SOFTWARE].startswith(b"poolcal ")
 
 
 def _las(path: Path) -> Batches:
@@ -168,6 +179,11 @@ def _nearest_m(placing: Placing, coordinates: Array, side: RunSide) -> float:
 def _elsewhere(path: Path, placing: Placing, coordinates: Array, count: int, side: RunSide) -> str:
     """Return the message that the points lie elsewhere, and in which CRS they would lie at the target."""
     away = _nearest_m(placing, coordinates, side)
+    if away < side.soundings.reach_m + MARGIN_M:
+        return (
+            f"{path}: too few soundings lie near the run's track ({count}; {LEAST_POINTS} are needed); "
+            "export whole passes"
+        )
     says = f"{path}: {count or 'no'} soundings lie near the run's track in {placing.name} ({placing.title})"
     found = hints(coordinates, side, 500.0)
     if found:

@@ -6,23 +6,35 @@ from typing import Any
 import numpy as np
 
 from pipeline.console import plural, signed
-from pipeline.entry_check.answer import Answer
+from pipeline.entry_check.answer import EVEN, Answer
 from pipeline.entry_check.check import EntryCheck
 from pipeline.entry_check.explanations import Explanation
 from pipeline.entry_check.judging import TOLERANCE_DEG, TOLERANCE_M
+from pipeline.exports.reading import ROLES
+from pipeline.exports.target import Target
+from pipeline.language.chosen import translated
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.mount import Mounted, setting_change
 from pipeline.text_table import text_table, wrapped
 
 BULLET = "  - "
 COARSE_M = 0.002
+TELLS_DEG, TELLS_M = 5.0, 0.5  # beyond, an answer excludes nothing that anybody would enter
+OTHER_SIGNS = (
+    "These are poolcal's signs; your program may have others: add --to NAME, such as qimera, to see both values in its "
+    "own (poolcal export --list shows the names)."
+)
 SHOWN_EXCESS_M = 0.002  # a smaller scatter beyond rounding is not worth a word
 
 
-def check_text(check: EntryCheck) -> str:
-    """Return the answer as text for the screen."""
+def check_text(check: EntryCheck, program: Target | None) -> str:
+    """Return the answer as text for the screen; ``program``: in whose signs the values are shown as well."""
     lines = [line for text in _answer(check) for line in _wrapped(text, "  ")]
     lines += ["", *_table(check), ""]
+    if program is not None:
+        lines += [*_table_of(program, check), ""]
+    elif check.answer.verdict in ("wrong", "undecidable"):
+        lines += [*_wrapped(OTHER_SIGNS, ""), ""]
     lines += [line for text in _basis(check) for line in _wrapped(text, "")]
     return "\n".join(lines)
 
@@ -62,8 +74,8 @@ def _answer(check: EntryCheck) -> Iterator[str]:
     if answer.excess_m > SHOWN_EXCESS_M:
         yield (
             f"The soundings scatter by {1000 * answer.excess_m:.0f} mm beyond rounding. The software traces rays "
-            "otherwise (another sound speed or cast), it has other positions or attitudes than the run, or its "
-            "soundings were smoothed."
+            "otherwise (another sound speed or cast), it has other positions or attitudes than the run, its soundings "
+            "were smoothed, or not all were placed with the same mount."
         )
 
 
@@ -77,13 +89,23 @@ def _uncertain(check: EntryCheck) -> Iterator[str]:
     answer = check.answer
     most_deg = answer.angle_deg + answer.angle_limit_deg
     most_m = float((np.abs(answer.lever_m) + answer.lever_limit_m)[: 2 if answer.way.any_height else 3].max())
-    yield (
-        "Cannot be told closely enough: the calibrated mount explains the soundings, but so does any other within "
-        f"{most_deg:.3f}° and {most_m:.3f} m. A larger mistake is excluded."
-    )
+    if check.pairs.evenness < EVEN:
+        yield "Cannot be told: the calibrated mount explains the soundings that were found, but not all were."
+    elif most_deg > TELLS_DEG or most_m > TELLS_M:
+        yield "Cannot be told: the soundings that were found are too few, or scatter too much."
+    else:
+        yield (
+            "Cannot be told closely enough: the calibrated mount explains the soundings, but so does any other within "
+            f"{most_deg:.3f}° and {most_m:.3f} m. A larger mistake is excluded."
+        )
     if answer.explanations[0].words:
         yield f"Besides: {_joined(answer.explanations[0])}."
-    if check.file.points.rounding_m > COARSE_M:
+    if check.pairs.evenness < EVEN:
+        yield (
+            "Of some passes hardly any sounding was found: they are missing in the file, or another mount placed them. "
+            "Export all in the order of time."
+        )
+    elif check.file.points.rounding_m > COARSE_M:
         yield "The file rounds its places to a centimetre or more: export text with 3 decimals."
     elif answer.excess_m <= SHOWN_EXCESS_M:
         yield "Export more soundings, of all passes."
@@ -101,9 +123,9 @@ def _about_z(answer: Answer) -> Iterator[str]:
 
 def _rows(check: EntryCheck) -> Iterator[tuple[str, str, float, float, float, float]]:
     """Yield name, unit, calibrated and found value, difference and sigma of each setting."""
-    fitted, total = check.answer.way.fitted, check.source.total
-    found = Mounted(fitted.R_body_from_mbes, fitted.lever_arm_m)
-    wanted, values, sigmas = total.settings(), found.settings(), found.sigmas(fitted.covariance[:6, :6])
+    fitted, found = check.answer.way.fitted, _found(check)
+    wanted, values = check.source.total.settings(), found.settings()
+    sigmas = found.sigmas(fitted.covariance[:6, :6])
     for name, _, key, unit in PARAMETERS:
         yield name, unit, wanted[key], values[key], setting_change(values, wanted, key), sigmas[key]
 
@@ -114,6 +136,24 @@ def _table(check: EntryCheck) -> list[str]:
         mark = "°" if unit == "deg" else "m"
         rows.append([name, f"{wanted:.4f}", f"{found:.4f}", signed(difference, 4), f"{sigma:.4f}", mark])
     return text_table("<6>12>12>12>10 <2", ["mount", "calibrated", "found", "difference", "sigma", ""], rows)
+
+
+def _table_of(program: Target, check: EntryCheck) -> list[str]:
+    """Return the same values as the program has them; with an order of rotations that is not known, as on its sheet."""
+    convention, senses = program.convention, program.convention.words()
+    wanted, found = (convention.numbers(one).by_role() for one in (check.source.total, _found(check)))
+    rows = []
+    for role in ROLES:
+        unit = "m" if role in ("x", "y", "z") else "°"
+        name = f"{translated(role)} ({translated(senses[role])})"
+        rows.append([name, f"{wanted[role]:.4f}", f"{found[role]:.4f}", unit])
+    title = f"In the signs of {program.title}, positions from the INS:"
+    return [*_wrapped(title, ""), *text_table("<6>12>12 <2", ["", "to be entered", "found", ""], rows)]
+
+
+def _found(check: EntryCheck) -> Mounted:
+    fitted = check.answer.way.fitted
+    return Mounted(fitted.R_body_from_mbes, fitted.lever_arm_m)
 
 
 def _basis(check: EntryCheck) -> Iterator[str]:

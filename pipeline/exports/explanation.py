@@ -64,6 +64,10 @@ def explanation(target: Target, mounting: Mounting, options: Options, zeros: str
         lines.append(spread_sentence(mounting.vessel.R_body_from_sensor, options))
     if mounting.origin.held:
         lines.append(f"Not good enough by the run itself: {', '.join(mounting.origin.held)}.")
+    lines += [
+        f"Estimated with the mount: {words}. The values hold with that alone: correct it before you enter them."
+        for words in mounting.origin.free
+    ]
     if mounting.latency_s:
         lines.append(
             f"Latency: the {SENSOR_WORDS[mounting.sensor]}'s times are {mounting.latency_s:.6f} s late against the "

@@ -93,7 +93,8 @@ class Origin:
     """Where a mount comes from.
 
     rejected: reasons of a rejected run, None if it was accepted; held: values that the run does not call good enough;
-    start_utc: begin of the first pass; digest: SHA-256 of calibration.json; kind: what the mount is, in words.
+    free: what else was estimated with the mount, in words; start_utc: begin of the first pass; digest: SHA-256 of
+    calibration.json; kind: what the mount is, in words.
     """
 
     session: str
@@ -101,6 +102,7 @@ class Origin:
     kind: str
     rejected: tuple[str, ...] | None = None
     held: tuple[str, ...] = ()
+    free: tuple[str, ...] = ()
     start_utc: str | None = None
     digest: str | None = None
 

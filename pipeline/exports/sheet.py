@@ -8,14 +8,14 @@ import re
 import textwrap
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
 
+from pipeline.config.session import Calibrated
 from pipeline.errors import ConfigError
 from pipeline.exports.convention import Convention
 from pipeline.exports.explanation import explanation, heading, sigmas_of
 from pipeline.exports.mounting import Mounting, sigma_text
 from pipeline.exports.reading import ROLES, number, numbers_of, whole_lines, written_for
-from pipeline.exports.target import Options, Read, Target
+from pipeline.exports.target import CountsFrom, Options, Read, Target
 from pipeline.mount import Mounted
 
 DECIMALS = 4  # of degrees and metres: rounding is below 0.00005 degrees, 0.05 mm
@@ -52,20 +52,21 @@ class Sheet:
         name: str,
         title: str,
         convention: Convention,
+        *,
         writes: str = "entry sheet",
         read: Read | None = None,
-        **others: Any,
+        sensor: Calibrated | None = "mbes",
+        counts_from: CountsFrom = "vessel",
+        uses: frozenset[str] = frozenset(),
     ) -> Target:
         """Return the target whose form is this sheet.
 
         Parameters
         ----------
-        name, title, convention, writes
+        name, title, convention, writes, sensor, counts_from, uses
             As in Target.
         read
             Reads the mount from a text; None: from the sheet's fields.
-        others
-            Other attributes of Target. The sensor is the sonar if they do not tell another.
         """
         return Target(
             name=name,
@@ -75,7 +76,9 @@ class Sheet:
             convention=convention,
             write=self.write,
             read=read or self.read,
-            **{"sensor": "mbes", **others},
+            sensor=sensor,
+            counts_from=counts_from,
+            uses=uses,
         )
 
     def write(self, target: Target, mounting: Mounting, options: Options) -> str:

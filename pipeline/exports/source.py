@@ -55,6 +55,7 @@ def mounting_of(run: FinishedRun, sensor: Calibrated | None, although_rejected: 
             kind=f"calibrated mount, result {run.result['result']}",
             rejected=None if rejected is None else tuple(map(one_line, rejected)),
             held=tuple(map(str, run.result.get("held", ()))),
+            free=tuple(one_line(str(one["words"])) for one in run.result.get("free", {}).values()),
             start_utc=str(passes[0]["start_utc"]) if passes else None,
             digest=sha256(run.path / "report" / "calibration.json"),
         )
@@ -62,7 +63,7 @@ def mounting_of(run: FinishedRun, sensor: Calibrated | None, although_rejected: 
             mounting = _calibrated(run.path, run.result[calibrated], calibrated, origin)
         elif sensor == "laser":
             kind = "the laser's mount by the settings, on which the sonar's calibration rests (no result of this run)"
-            mounting = _laser_setting(session, replace(origin, kind=kind, held=()))
+            mounting = _laser_setting(session, replace(origin, kind=kind, held=(), free=()))
         else:
             raise ConfigError(f"{run.path}: calibrates the laser alone, and holds no sonar; name a sonar's run")
     return _with_settings(mounting, session)

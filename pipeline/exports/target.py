@@ -14,6 +14,7 @@ from pipeline.mount import Mounted
 
 Read = Callable[["Target", str, str, "Options"], Mounted]
 Write = Callable[["Target", Mounting, "Options"], str]
+CountsFrom = Literal["vessel", "ins", "water"]
 SERIAL = re.compile(r"[A-Za-z0-9_.-]{1,50}")
 
 
@@ -67,7 +68,7 @@ class Target:
     write: Write
     read: Read
     sensor: Calibrated | None = None
-    counts_from: Literal["vessel", "ins", "water"] = "vessel"
+    counts_from: CountsFrom = "vessel"
     uses: frozenset[str] = frozenset()
     has_marks: bool = True
 

@@ -1,5 +1,6 @@
 """The table at the end of ``poolcal repeat``: a line for each session."""
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -98,14 +99,24 @@ def outcome_table(outcomes: Sequence[Outcome], moved: Mapping[Path, str]) -> lis
         below += [f"{where}: {kind} not drawn" for kind in outcome.answer.not_drawn]
     head = ("verdict", *heads, "since before")
     room = WIDTH - 1 - max(map(letters.width, text_table(LAYOUT, head, rows)))
-    labels = [_cut(outcome.session.label, max(room, LEAST_LABEL)) for outcome in outcomes]
+    labels = _labels([outcome.session.label for outcome in outcomes], max(room, LEAST_LABEL))
     whole = ((label, *row) for label, row in zip(labels, rows, strict=True))
     table = text_table(f"<{LEAST_LABEL} {LAYOUT}", ("session", *head), whole)
     return [*table, *([""] if below else []), *below]
 
 
+def _labels(whole: Sequence[str], room: int) -> list[str]:
+    """Return the sessions' names, cut off in front, but no two of them alike: then they are given more room.
+
+    >>> _labels(["data/boat_a/2026-05-12", "data/boat_b/2026-05-12"], 12)
+    ['…a/2026-05-12', '…b/2026-05-12']
+    """
+    cut = ([_cut(label, wider) for label in whole] for wider in itertools.count(room))
+    return next(labels for labels in cut if len({*labels}) == len({*whole}))
+
+
 def _cut(label: str, room: int) -> str:
-    """Return a session's name, cut off in front if it is too long: its end tells sessions apart.
+    """Return a session's name, cut off in front if it is too long.
 
     >>> _cut("data/boat_a/2026-05-12", 17), _cut("2026-05-12", 17)
     ('…oat_a/2026-05-12', '2026-05-12')

@@ -36,7 +36,6 @@ from typing import Any
 import pandas as pd
 
 from pipeline.config.pool import Method, VerdictLimits
-from pipeline.console import plural
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.report.ambiguities import MountSearch, ambiguities
 from pipeline.report.coarse_mount import contradicted_coarse_mount
@@ -188,13 +187,15 @@ def _suspected_cause(causes: list[SuspectedCause], is_second: bool) -> list[Stat
         return []
     first = causes[0]
     rivals = [cause for cause in causes[1:] if first.strength - cause.strength <= NEARLY_AS_WELL]
-    nearly = "".join(f"; nearly as well (strength {cause.strength:.0f}): {cause.words}" for cause in rivals)
     others = len(causes) - 1 - len(rivals)
-    rest = f"; {plural(others, 'other cause')} would explain it less well" if others else ""
     unless = ", unless the face, step, height, pass or ping named above is itself the cause" if is_second else ""
-    given = "; a larger drift of the INS would explain less" if first.not_drift else ""
-    words = f"likely cause of residuals{unless} (strength {first.strength:.0f}{given}): {first.words}{nearly}{rest}"
-    return [Statement(ReasonCode.SUSPECTED_CAUSE, words)]
+    strength = f"{first.strength:.0f}"
+    if first.not_drift:
+        strength = f"{strength}; a larger drift of the INS would explain less"
+    parts = [f"likely cause of residuals{unless} (strength {strength}): {first.words}"]
+    parts += [f"nearly as well (strength {cause.strength:.0f}): {cause.words}" for cause in rivals]
+    parts += [f"other causes that would explain it less well: {others}"] if others else []
+    return [Statement(ReasonCode.SUSPECTED_CAUSE, "; ".join(parts))]
 
 
 def _estimates_off_settings(freed: pd.DataFrame, level: float) -> list[Statement]:

@@ -12,7 +12,7 @@ SESSION, POOL, DEFAULT = "session", "pool", "default"
 UNRECORDED = "default, or the same in the file"  # an older run.yaml does not say which
 
 
-def origin_of(settings: Settings, key: str) -> str:
+def origin_of(settings: Settings, key: str, changed: bool = False) -> str:
     """Return where a setting's value comes from.
 
     Parameters
@@ -22,6 +22,8 @@ def origin_of(settings: Settings, key: str) -> str:
     key
         The dotted key in session.yaml (``laser.range_sigma_m``), or that in the pool's config
         (``as_built.face_sigma_m``).
+    changed
+        Whether the value is known not to be the default; the key may then go on into free names, as those of faces.
 
     Returns
     -------
@@ -40,7 +42,7 @@ def origin_of(settings: Settings, key: str) -> str:
         return words if key in settings.stated[file] else DEFAULT
     if of_figure is not None:
         return words if of_figure == "session" else DEFAULT
-    return UNRECORDED if value_of(settings, key) == default_at(type(model), key) else words
+    return words if changed or value_of(settings, key) != default_at(type(model), key) else UNRECORDED
 
 
 def is_assumed(settings: Settings, key: str) -> bool:

@@ -6,6 +6,7 @@ the INS proves nothing, because one log may cover several sessions. If no file i
 session with the same folder and the same name is taken for the same one.
 """
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -26,7 +27,7 @@ def refuse_other_session(this: Run, stages: Sequence[str]) -> None:
     if not recorded or recorded & set(raw_of(this, sensor).values()):
         return
     name, folder = _recorded_session(this.path)
-    if name == session.name and folder is not None and folder.resolve() == this.settings.session_folder:
+    if name == session.name and folder is not None and Path(os.path.realpath(folder)) == this.settings.session_folder:
         return
     noun, command = {"mbes": ("sonar", "run"), "laser": ("laser", "laser")}[sensor]
     recorded_session = f"{name!r} in {folder}" if folder is not None else f"which its {RUN_YAML} does not tell"

@@ -1,6 +1,7 @@
 """Files that a command writes to paths from its options. None may replace a file of a run or of a session."""
 
 import contextlib
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -47,10 +48,10 @@ def refuse_output(
     with writing(file):
         if not file.parent.is_dir():
             raise ConfigError(f"{option} {file}: there is no folder {file.parent}; make it, or name another file")
-        if file.exists() and not file.is_file():
+        if os.path.lexists(file) and not file.is_file():
             raise ConfigError(f"{option} {file}: is no file; name another")
         for run_folder in runs:
-            if file.resolve().is_relative_to(run_folder.resolve()):
+            if Path(os.path.realpath(file)).is_relative_to(os.path.realpath(run_folder)):
                 raise ConfigError(f"{option} {file}: lies in the folder {run_folder}; name a file elsewhere")
         if (begins or holds) and file.is_file():
             with file.open("rb") as there:

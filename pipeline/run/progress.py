@@ -1,4 +1,7 @@
-"""The progress of a run: on a terminal a bar with rate and time left, elsewhere one line for each finished stage."""
+"""The progress of a run: on a terminal a bar with rate and time left, elsewhere one line for each finished stage.
+
+A command without stages shows on a terminal what it is doing, and elsewhere nothing.
+"""
 
 import contextlib
 import sys
@@ -8,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TextIO
 
+from pipeline.language.chosen import translated
 from pipeline.language.speaking import say
 
 if TYPE_CHECKING:
@@ -42,14 +46,15 @@ class Progress:
     def stage(self, name: str) -> Iterator[None]:
         """Show the progress of one stage. At the end print its time, its rows and its rate."""
         self._rows, start = 0, time.perf_counter()
-        with self._shown(name):
+        with self.shown(name):
             yield
         seconds = time.perf_counter() - start
         rate = f", {self._rows:,} rows, {self._rows / max(seconds, 1e-9):,.0f} rows/s" if self._rows else ""
         self.note(f"{name}: done in {seconds:.1f} s{rate}")
 
     @contextlib.contextmanager
-    def _shown(self, name: str) -> Iterator[None]:
+    def shown(self, words: str) -> Iterator[None]:
+        """Show on a terminal what is being done, as long as it is; elsewhere print nothing."""
         if self.quiet or not self.stream.isatty():
             yield
             return
@@ -59,11 +64,16 @@ class Progress:
         columns: tuple[Any, ...] = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn())
         columns += (TextColumn("{task.fields[rate]}"), TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn())
         with Progress(*columns, console=Console(file=self.stream), transient=True) as self._bar:
-            self._bar.add_task(name, total=None, rate="")
+            self._bar.add_task(translated(words), total=None, rate="")
             try:
                 yield
             finally:
                 self._bar = None
+
+    def next(self, words: str) -> None:
+        """Show other words: a further step of what is being done."""
+        if self._bar is not None:
+            self._bar.update(self._bar.task_ids[0], description=translated(words))
 
     def begin(self, total: int | None) -> None:
         """Start to count the rows of the streams that are mapped next; ``total``: their number, None if unknown."""

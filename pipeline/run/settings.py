@@ -1,5 +1,6 @@
 """Settings of a run. They are read from YAML, kept in run.yaml, and refused if they cannot be correct."""
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -7,15 +8,15 @@ from typing import Any
 
 import yaml
 
-from pipeline.atomic_files import sha256, write_text
+from pipeline.atomic_files import write_text
 from pipeline.config.about import About
 from pipeline.config.fill_in import refuse_unfilled
-from pipeline.config.load import load_pool, load_session, session_yaml, stated_keys
+from pipeline.config.load import pool_in, session_in, session_yaml, stated_keys
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import Calibrated, Mbes, SessionConfig
 from pipeline.config.stage_settings import settings_by_name
 from pipeline.config.target import Target
-from pipeline.config.yaml_file import SESSION_YAML, read_yaml, text_of
+from pipeline.config.yaml_file import SESSION_YAML, YamlFile, content_of, read_yaml, text_of
 from pipeline.config.yaml_models import parse
 from pipeline.errors import ArtefactError, ConfigError
 from pipeline.readers.casts import with_cast
@@ -43,13 +44,20 @@ class Settings:
         return settings_by_name(self.pool, self.session)
 
     def is_about_changed(self) -> bool:
-        """Return whether ``about`` in session.yaml is another than the run's; False if it cannot be read."""
+        """Return whether ``about`` in session.yaml is another than the run's; False if there is no such file now.
+
+        A file with a fault has been edited since, and may hold names that the run does not have.
+        """
         path = self.session_folder / SESSION_YAML
         try:
-            block = read_yaml(path).get("about") or {}
-            return isinstance(block, dict) and parse(About, block, str(path)) != self.session.about
+            text = text_of(path)
         except ConfigError:
             return False
+        try:
+            block = content_of(text, path).get("about") or {}
+            return not isinstance(block, dict) or parse(About, block, str(path)) != self.session.about
+        except ConfigError:
+            return True
 
     def as_json(self) -> dict[str, Any]:
         """Return the settings as plain values, defaults filled in."""
@@ -57,7 +65,7 @@ class Settings:
 
 
 def load_settings(session_folder: Path, config_path: Path, calibrated: Calibrated | None = "mbes") -> Settings:
-    """Read and check both YAML files.
+    """Read and check both YAML files, each of them once: a file that is changed meanwhile gives no mixture.
 
     Parameters
     ----------
@@ -69,15 +77,16 @@ def load_settings(session_folder: Path, config_path: Path, calibrated: Calibrate
         "mbes": the sonar. "laser": the laser; a sonar in the session is ignored. None: the sonar if the session has
         one, otherwise the laser.
     """
-    if config_path.is_file():
-        refuse_unfilled({path: text_of(path) for path in (session_yaml(session_folder), config_path)})
-    pool = load_pool(config_path)
+    config = YamlFile.read(config_path)
+    files = {"session": YamlFile.read(session_yaml(session_folder)), "config": config}
+    refuse_unfilled(files.values())
+    pool = pool_in(config)
     try:
         target_of(pool.target)
     except ConfigError as error:
         raise ConfigError(f"{config_path}: {error}") from error
     refuse_unknown_faces(pool, config_path)
-    session = load_session(session_folder, with_cast)
+    session = session_in(files["session"], with_cast)
     if calibrated == "laser":
         session = session.model_copy(update={"mbes": None})
     elif calibrated == "mbes" and session.calibrated == "laser":
@@ -85,10 +94,9 @@ def load_settings(session_folder: Path, config_path: Path, calibrated: Calibrate
         raise ConfigError(f"{where}: mbes: is missing; add it (poolcal laser calibrates the laser without a sonar)")
     if session.mbes is not None:
         refuse_shallow_cast(pool.target, session.mbes, session_folder / SESSION_YAML)
-    paths = {"session": session_folder / SESSION_YAML, "config": config_path}
-    files = {name: sha256(path) for name, path in paths.items()}
-    stated = {name: stated_keys(path) for name, path in paths.items()}
-    return Settings(session_folder.resolve(), pool, session, files, stated)
+    digests = {name: file.sha256 for name, file in files.items()}
+    stated = {name: stated_keys(file.content) for name, file in files.items()}
+    return Settings(session_folder.resolve(), pool, session, digests, stated)
 
 
 def refuse_unknown_faces(pool: PoolConfig, path: Path) -> None:
@@ -133,14 +141,14 @@ def refuse_shared_folder(run: Path, session_folder: Path) -> None:
             str(path).encode()
         except UnicodeEncodeError as error:
             raise ConfigError(f"{str(path)!r}: the name is no UTF-8 text; rename the folder") from error
-    inner, outer = run.resolve(), session_folder.resolve()
+    inner, outer = (Path(os.path.realpath(path)) for path in (run, session_folder))  # a link to itself, too
     if inner.is_relative_to(outer) or outer.is_relative_to(inner):
         raise ConfigError(f"--run {run}: lies in the session folder {session_folder}, or round it; name a folder apart")
 
 
 def holds_run(run: Path) -> bool:
     """Return whether ``run`` is a run folder: run.yaml is in it."""
-    return (run / RUN_YAML).is_file()
+    return os.path.isfile(run / RUN_YAML)  # a folder that is closed to us is none
 
 
 def refuse_other_sensor(run: Path, calibrated: Calibrated) -> None:
@@ -173,7 +181,7 @@ def write_settings(run: Path, settings: Settings) -> None:
 def read_settings(run: Path) -> Settings:
     """Return the settings in run.yaml, with which the run in this folder was made."""
     path = run / RUN_YAML
-    if not path.is_file():
+    if not holds_run(run):
         raise ArtefactError(f"{run}: holds no {RUN_YAML}, so it is no run folder; name one of poolcal run's")
     content = read_yaml(path)
     folder, files, stated = content.get("session_folder"), content.get("files", {}), content.get("stated", {})

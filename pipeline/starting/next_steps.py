@@ -71,7 +71,10 @@ def steps_text(session: Path, pool: Path | None, open_keys: Sequence[tuple[Path,
             command("export", "RUN", "--to", "NAME"),
             command("check-entry", "RUN", "SOUNDINGS"),
         ],
-        ["Print the certificate (its names: about in session.yaml):", command("report", "RUN", "--pdf", "FILE.pdf")],
+        [
+            "Print the certificate (its names: about in session.yaml):",
+            command("report", "RUN", "--pdf", "FILE.pdf", "--certificate"),
+        ],
     ]
     lines = ["Left to be done:"]
     for number, (words, *below) in enumerate(steps, 1):

@@ -7,7 +7,7 @@ from pipeline.config.instruments import Sensor
 from pipeline.console import plural
 from pipeline.maths.mount_parameters import SETTINGS
 from pipeline.readers.crs import LASER_FRAME
-from pipeline.starting.assumed import about, assumed
+from pipeline.starting.figure_comments import about_comments, figure_comments
 from pipeline.starting.file_groups import FileGroup
 from pipeline.starting.folder_survey import FolderSurvey
 from pipeline.starting.left_out_words import left_out_lines
@@ -32,7 +32,7 @@ def session_text(survey: FolderSurvey) -> str:
     lines = [*comment(_HEAD), *_name(survey)]
     for sensor in ("ins", "laser", "mbes"):
         lines += ["", *_sensor(sensor, survey)]
-    return "\n".join([*lines, "", *about(), *_left_out(survey)]) + "\n"
+    return "\n".join([*lines, "", *about_comments(), *_left_out(survey)]) + "\n"
 
 
 def _name(survey: FolderSurvey) -> Iterator[str]:
@@ -53,7 +53,7 @@ def _sensor(sensor: Sensor, survey: FolderSurvey) -> Iterator[str]:
         yield from _open(sensor, groups)
     if sensor == "ins":
         yield from _accuracy(survey)
-        yield from assumed(sensor, has_preset=False)
+        yield from figure_comments(sensor, has_preset=False)
         return
     if sensor == "laser" and survey.frame is not None:
         yield from _frame(survey)
@@ -61,7 +61,7 @@ def _sensor(sensor: Sensor, survey: FolderSurvey) -> Iterator[str]:
         yield from _casts(survey)
     yield from _mount(sensor)
     group = survey.chosen(sensor)
-    yield from assumed(sensor, has_preset=group is not None and preset_of(group.instrument) != "")
+    yield from figure_comments(sensor, has_preset=group is not None and preset_of(group.instrument) != "")
 
 
 def _chosen(group: FileGroup, survey: FolderSurvey) -> Iterator[str]:

@@ -32,6 +32,7 @@ def _view(
 def _report(
     run_folder: RunFolder,
     pdf: Annotated[Path | None, typer.Option(metavar="FILE", help="write it as PDF as well, for print")] = None,
+    certificate: Annotated[bool, typer.Option("--certificate", help="of the PDF its first two pages alone")] = False,
 ) -> int:
     """Draw the report of a finished run, certificate first.
 
@@ -39,7 +40,7 @@ def _report(
     """
     from stages.commands import report
 
-    return report.command(run_folder, pdf)
+    return report.command(run_folder, pdf, certificate)
 
 
 @app.command("diff")

@@ -86,6 +86,9 @@ def _check_entry(
     other_heights: Annotated[
         bool, typer.Option("--other-heights", help="heights are not ellipsoidal: do not judge z")
     ] = False,
+    program: Annotated[
+        str | None, typer.Option("--to", metavar="NAME", help="show the values in this program's signs, too")
+    ] = None,
     as_json: AsJson = False,
 ) -> int:
     """Check that the mount was entered rightly elsewhere.
@@ -95,7 +98,7 @@ def _check_entry(
     """
     from stages.commands import check_entry
 
-    return check_entry.command(run_folder, soundings, crs, other_heights, as_json)
+    return check_entry.command(run_folder, soundings, crs, other_heights, program, as_json)
 
 
 @app.command("mount")

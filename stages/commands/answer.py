@@ -20,8 +20,8 @@ def print_answer(text: str, is_yes: bool, as_is: bool = False) -> int:
 
 def print_result(run: Path) -> int:
     """Print the result of a run, with a note on an assumed drift, and return the exit status: 1 if it was rejected."""
+    from pipeline.results.pages.assumptions import note_of_run
     from pipeline.results.screen import summary
-    from pipeline.run.assumed_drift import note_of_run
     from pipeline.run.results import calibration
     from pipeline.text_table import wrapped
 

@@ -1,6 +1,7 @@
 """``poolcal check``: the content and the faults of a session's files, before the session is calibrated."""
 
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,8 @@ from pipeline.config.session import SessionConfig
 from pipeline.errors import PoolcalError
 from pipeline.readers.casts import with_cast
 from pipeline.report.cast_checks import describe_cast
-from pipeline.run.assumed_drift import assumed_drift
+from pipeline.results.pages.assumptions import drift_note
+from pipeline.run.progress import Progress
 from pipeline.run.settings import load_settings
 from stages.commands.answer import print_answer
 from stages.in_memory import calibrate_in_memory
@@ -36,9 +38,11 @@ def command(session: Path, config: Path | None, as_json: bool) -> int:
     """
     settings = None if config is None else load_settings(session, config, None)
     content, pool = (load_session(session, with_cast), None) if settings is None else (settings.session, settings.pool)
-    findings = check_session(session, content, pool, _calibrated)
-    from_files = bool(findings.quality.sigmas)
-    note = "" if settings is None else assumed_drift(settings, from_files)
+    progress = Progress()
+    with progress.shown("reading and comparing the files"):
+        findings = check_session(session, content, pool, partial(_calibrated, progress))
+    from_files = findings.quality.sigmas if content.ins.drift_from == "files" else {}
+    note = "" if settings is None else drift_note(settings, from_files)
     if as_json:
         return print_answer(rendering.check_json(findings, note), not findings.faulty, as_is=True)
     used = None if content.mbes is None else content.mbes.svp_from
@@ -47,7 +51,8 @@ def command(session: Path, config: Path | None, as_json: bool) -> int:
     return print_answer(f"{cast}{rendering.check_text(findings, note)}{unasked}", not findings.faulty)
 
 
-def _calibrated(session: SessionConfig, pool: PoolConfig, raw: Raw) -> TrialCalibration:
+def _calibrated(progress: Progress, session: SessionConfig, pool: PoolConfig, raw: Raw) -> TrialCalibration:
+    progress.next("calibrating a sample of the points, then counting soundings")
     artefacts: dict[str, Any] = {}
 
     def keep(key: str, value: Any) -> Any:

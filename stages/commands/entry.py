@@ -47,6 +47,9 @@ def status_of(command: Callable[[], Any], debug: bool) -> int:
         if isinstance(error, OSError) and _raised_in(error).startswith(SPEAKERS):
             say(f"poolcal: {_refusal(error)}", sys.stderr)
             return 2
+        if isinstance(error, PermissionError) and error.filename is not None:
+            say(f"poolcal: {error.filename}: cannot be used ({error.strerror}); correct its permissions", sys.stderr)
+            return 2
         say(traceback.format_exc().rstrip(), sys.stderr, as_is=True)
         say("poolcal: this is a bug; please report it with the lines above", sys.stderr)
         return 3

@@ -1,10 +1,10 @@
-"""``poolcal report``: the report's page, whose first two pages are the certificate, and the same as PDF."""
+"""``poolcal report``: the report's page, whose first two pages are the certificate, and either of them as PDF."""
 
 import sys
 from pathlib import Path
 
 from pipeline.config.yaml_file import SESSION_YAML
-from pipeline.errors import ArtefactError
+from pipeline.errors import ArtefactError, ConfigError
 from pipeline.language.speaking import say
 from pipeline.run.output_files import refuse_output
 from pipeline.run.results import PAGE, agreeing, calibration
@@ -14,7 +14,7 @@ from stages.commands.answer import say_failures
 from stages.commands.draw import Drawings, draw_missing
 
 
-def command(run: Path, pdf: Path | None) -> int:
+def command(run: Path, pdf: Path | None, certificate: bool) -> int:
     """Draw the page of a finished run, if it is missing or out of date, and write it as PDF.
 
     Parameters
@@ -23,7 +23,11 @@ def command(run: Path, pdf: Path | None) -> int:
         The run folder. Its results are only read.
     pdf
         The PDF file; None: none is written.
+    certificate
+        Whether the PDF is to hold the certificate's two pages alone.
     """
+    if certificate and pdf is None:
+        raise ConfigError("--certificate: says what the PDF holds; add --pdf FILE")
     settings = read_settings(run)
     refuse_output("--pdf", pdf, run, settings.session_folder, begins=b"%PDF")
     calibration(run)
@@ -48,5 +52,5 @@ def command(run: Path, pdf: Path | None) -> int:
     if pdf is not None:
         from pipeline.results.pages.pdf import write_pdf
 
-        say(f"PDF: {pdf} (by {write_pdf(page, pdf)})", sys.stdout)
+        say(f"PDF: {pdf} (by {write_pdf(page, pdf, certificate)})", sys.stdout)
     return 0

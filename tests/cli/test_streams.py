@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from stages.cli import call
+from stages.commands.entry import status_of
 from tests.support.places import Told
 from tests.support.toy_commands import TOY, run_words, set_outcome, toy_poolcal
 from tests.support.toy_run import Pool
@@ -22,6 +23,16 @@ def test_names_cannot_command_the_terminal(pool: Pool, toy: Callable[..., Told])
     assert toy(*run_words(pool)).out == "a\\x1b[2Jb: accepted\n"
     (pool.session / "laser" / "\x1b[31m.bin").write_bytes(bytes(8))
     assert "take: laser/\\x1b[31m.bin changed" in toy(*run_words(pool)).err
+
+
+def test_a_path_that_is_closed_to_us_is_no_bug(capsys: pytest.CaptureFixture[str]) -> None:
+    def closed() -> None:
+        raise PermissionError(13, "Permission denied", "data/水池/s")
+
+    assert status_of(closed, debug=False) == 2
+    assert capsys.readouterr().err == (
+        "poolcal: data/水池/s: cannot be used (Permission denied); correct its permissions\n"
+    )
 
 
 def test_nobody_listens(pool: Pool) -> None:

@@ -62,7 +62,7 @@ def test_an_accepted_run_has_a_certificate(undisturbed: tuple[Path, Told]) -> No
         assert float(half) == pytest.approx(half_width, abs=5.1e-4 if angle else 0.051)
     assert [row[0] for row in page.table("", "name", "date")] == ["evaluated by", "approved by"]
     assert "poolcal is not yet proven on a real calibration" in text
-    speed = re.search(r"They were found at ([\d.]+) m/s \(([\d.]+) kn\)", text)
+    speed = re.search(r"The values were found at ([\d.]+) m/s \(([\d.]+) kn\)", text)
     assert speed is not None
     assert float(speed[1]) == pytest.approx(0.4, abs=0.051)
     assert float(speed[2]) == pytest.approx(0.4 / 0.5144, abs=0.051)
@@ -149,6 +149,23 @@ def test_a_rejected_run_is_marked_and_has_no_line_to_sign(done: Place) -> None:
     classes = [attributes.get("class") or "" for attributes in page.named("table")]
     assert "whole values quiet" in classes
     assert not any("signatures" in one for one in classes)
+    assert "This run is rejected: the uncertainties on this sheet" in text
+    for promise in ("The values hold until", "the mount takes at most", "before you rely on", "they replace"):
+        assert promise not in text
+
+
+def test_words_of_the_crew_stay_as_they_are_in_another_language(done: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A vessel may be called by a word of the catalogue."""
+    monkeypatch.setenv("POOLCAL_LANG", "zh")
+    words = {"make": "sonar", "model": "up", "serial": "forward", "firmware": "accepted", "remarks": "pool"}
+    about = {"vessel": "pool", "surveyor": "roll", "approved_by": "yaw", "instruments": {"mbes": words}}
+    done.edit_session("", name="laser", about=about)
+    assert done.calibrate("--report").status == 0
+    page = Page(html_of(done.run))
+    assert page.headings[0] == "laser"
+    assert "船名 pool" in " ".join(page.text.split())
+    assert ["声呐", "sonar up; pool", "forward", "accepted"] in page.table("仪器")
+    assert [row[1] for row in page.table("", "名称", "日期")] == ["roll", "yaw"]
 
 
 def test_without_a_solution_there_are_dashes(small: Path, tmp_path: Path) -> None:
@@ -159,7 +176,10 @@ def test_without_a_solution_there_are_dashes(small: Path, tmp_path: Path) -> Non
     assert [row[2:] for row in page.table("value", "positive")] == [["–", "–"]] * 6
     text = " ".join(page.text.split())
     assert "There is no solution, and so no uncertainty." in text
-    assert "What it means for soundings" not in text
+    for nothing in ("What it means for soundings", "Assumed, not stated", "were found at", "The uncertainties"):
+        assert nothing not in text
+    untold = text[text.index("The points tell nothing of: ") :].partition(". ")[0].split("; ")
+    assert len({*untold}) == len(untold)
     assert not re.search(r"\bnan\b", text.lower())
 
 
@@ -177,9 +197,11 @@ def test_an_older_run_folder_says_what_it_does_not_know(done: Place) -> None:
     path = done.run / "run.yaml"
     content = yaml.safe_load(path.read_text(encoding="utf-8"))
     del content["files"]
+    del content["stated"]
     del content["session"]["about"]
     path.write_text(yaml.safe_dump(content, allow_unicode=True), encoding="utf-8")
-    drawn_again(done.run)
+    page = Page(drawn_again(done.run))
+    assert "This older run does not record which figures the crew stated." in " ".join(page.text.split())
     rows = dict(_digest_rows(done.run))
     assert rows["session.yaml"] == rows["the pool's config"] == "not recorded by the version that made this run"
 
@@ -219,6 +241,8 @@ def test_report_refuses_what_is_not_finished(done: Place, tmp_path: Path) -> Non
         assert (told.status, len(told.err.splitlines())) == (2, 1), told.err
         assert words in told.err
     assert mine.read_text() == "my notes"
+    told = poolcal("report", done.run, "--certificate")
+    assert (told.status, told.err.count("\n"), "add --pdf FILE" in told.err) == (2, 1, True)
     shutil.rmtree(done.run / "adjust")
     told = poolcal("report", done.run, "--pdf", pdf)
     assert (told.status, len(told.err.splitlines())) == (2, 1)
@@ -240,6 +264,8 @@ def test_names_that_came_after_the_run_are_not_left_out_in_silence(done: Place, 
     told = poolcal("report", done.run, "--pdf", pdf)
     assert (told.status, len(told.err.splitlines()), pdf.exists()) == (2, 1, False)
     assert "poolcal run again" in told.err
+    done.edit_session("about", client=None, custommer="Port of Qingdao")  # misspelt: it is not left out either
+    assert poolcal("report", done.run, "--pdf", pdf).status == 2
     done.edit_session("", about=None)
     done.edit_session("mbes", mount={"x_m": 0.37})  # as poolcal laser writes the mount that it found
     assert poolcal("report", done.run).err == ""

@@ -157,6 +157,16 @@ def test_parts_of_the_soundings_will_do(
     assert found["explanations"][0]["codes"][0] == "sign_yaw"
 
 
+def test_lines_with_other_values_are_no_right_entry(
+    run: Path, recorded: Recording, right: Entry, tmp_path: Path
+) -> None:
+    file, placed, late = tmp_path / "a.xyz", georeferenced(recorded, right), recorded.t_ns > np.median(recorded.t_ns)
+    other = georeferenced(recorded, replace(right, angles_deg=tuple(np.add(right.angles_deg, 0.8))))
+    write_points(file, in_crs(np.where(late[:, None], other, placed), UTM), 3)
+    assert asked(run, file)[0] == 1
+    assert "or not all were placed with the same mount" in " ".join(poolcal("check-entry", run, file).out.split())
+
+
 def test_heights_of_another_surface(run: Path, recorded: Recording, right: Entry, tmp_path: Path) -> None:
     file = tmp_path / "a.csv"
     points = in_crs(georeferenced(recorded, right), UTM, lift_m=-8.312)
@@ -203,6 +213,8 @@ def test_another_zone_is_named_and_swapped_axes_are_read(
     told = poolcal("check-entry", run, file, "--crs", UTM)
     assert told.status == 2
     assert "m from the target; is it another datum, another CRS, or another session?" in told.err
+    write_points(file, in_crs(placed, UTM)[:59], 3)
+    assert "too few soundings lie near the run's track (59; 60 are needed)" in poolcal("check-entry", run, file).err
     write_points(file, in_crs(placed, UTM)[:, [1, 0, 2]], 3)
     status, found = asked(run, file, "--crs", UTM)
     assert status == 0
@@ -227,6 +239,34 @@ def test_bad_input_is_one_line(run: Path, tmp_path: Path, content: str, more: tu
     assert (told.status, told.out) == (2, "")
     assert said in told.err
     assert told.err.count("\n") == 1
+
+
+def test_the_values_stand_in_the_signs_of_the_program_too(
+    run: Path, recorded: Recording, right: Entry, tmp_path: Path
+) -> None:
+    """Qimera's heading is + to starboard: what stands there wrongly is poolcal's number, and looks right."""
+    file, (roll, pitch, heading) = tmp_path / "a.xyz", right.angles_deg
+    write_points(file, in_crs(georeferenced(recorded, replace(right, angles_deg=(roll, pitch, -heading))), UTM), 3)
+    told = poolcal("check-entry", run, file, "--to", "qimera")
+    assert (told.status, told.err) == (1, "")
+    (line,) = [line for line in told.out.splitlines() if line.startswith("yaw (bow to starboard +")]
+    to_be_entered, found = map(float, line.rpartition(")")[2].split()[:2])
+    assert to_be_entered == pytest.approx(heading, abs=1e-4)
+    assert found == pytest.approx(-heading, abs=1e-3)
+    assert "add --to NAME" not in told.out
+    told = poolcal("check-entry", run, file)
+    assert "These are poolcal's signs; your program may have others: add --to NAME" in told.out
+    for program, said in (("qimera2", "is no program known here"), ("pdal", "takes the laser's mount")):
+        told = poolcal("check-entry", run, file, "--to", program)
+        assert (told.status, told.err.count("\n")) == (2, 1)
+        assert said in told.err
+
+
+def test_a_cloud_of_poolcal_itself_proves_nothing(run: Path, tmp_path: Path) -> None:
+    assert poolcal("export", run, "--to", "laz", "--crs", UTM, "--out", tmp_path / "own.laz").status == 0
+    told = poolcal("check-entry", run, tmp_path / "own.laz")
+    assert (told.status, told.out, told.err.count("\n")) == (2, "", 1)
+    assert "proves nothing of another program" in told.err
 
 
 def test_a_grid_is_refused(run: Path, recorded: Recording, right: Entry, tmp_path: Path) -> None:

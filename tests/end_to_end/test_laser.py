@@ -177,6 +177,6 @@ def test_its_page_and_recordings_show_the_laser_alone(laser: Place) -> None:
     expected = np.r_[np.array(sigma["rotation_vector_deg"])[[1, 0, 2]], 1000 * np.array(sigma["lever_arm_m"])]
     parts = np.array([row[1:] for row in rows], dtype=float)
     np.testing.assert_allclose(np.sqrt((parts**2).sum(axis=0)), expected, rtol=0.01, atol=0.0002)
-    for word in ("Three ways", "Agreement of the planes", "soundings on"):
+    for word in ("Three ways", "Agreement of the planes", "soundings on", "water's load"):
         assert word not in page.text
     assert sorted(path.stem for path in laser.run.glob("*/*.rrd")) == sorted(STAGES)

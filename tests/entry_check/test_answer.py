@@ -1,5 +1,6 @@
 """Which mistakes are named, on both sides of the tolerance, and where two give the same numbers."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -16,10 +17,11 @@ RIGHT_R = rotation(ANGLES)
 
 
 def answer(
-    points: np.ndarray, source: EntrySource = SOURCE, heights_differ: bool = False, noise_m: float = 3e-4
-) -> Answer:
+    points: np.ndarray, source: EntrySource = SOURCE, heights_differ: bool = False, noise_m: float = 3e-4,
+    boat: Boat = BOAT, evenness: float = 1.0,
+) -> Answer:  # fmt: skip
     points = points + np.random.default_rng(5).normal(0, noise_m, points.shape)
-    pairs = Pairs(BOAT.soundings, points, len(points), 1.0, 0.0, False, "order")
+    pairs = Pairs(boat.soundings, points, len(points), 1.0, 0.0, False, "order", evenness=evenness)
     return answer_of(pairs, source, heights_differ, 0.0005)
 
 
@@ -121,7 +123,38 @@ def test_an_angle_may_be_the_attitudes_but_a_large_one_turns_the_lever_arm_too()
     found = answer(BOAT.placed(turned @ RIGHT_R, turned @ LEVER))
     assert (found.verdict, codes(found)) == ("right_but", {frozenset({"attitudes"})})
     found = answer(BOAT.placed(rotation(ANGLES | {"yaw": -1.6}), LEVER))
-    assert (found.verdict, codes(found)) == ("undecidable", {frozenset({"attitudes"}), frozenset({"unknown_angles"})})
+    assert (found.verdict, codes(found)) == ("undecidable", {frozenset({"attitudes"}), frozenset({"mistyped"})})
+
+
+def test_a_mistyped_roll_is_no_other_order_of_rotations_that_nearly_fits() -> None:
+    """Two digits exchanged; the order pitch · yaw · roll would be off by three hundredths of that, as if rounded."""
+    wanted = {"roll": -48.7612, "pitch": 1.2051, "yaw": -1.9960}
+    for roll, key in ((-48.7162, "exchanged"), (-48.6912, "mistyped")):
+        source = replace(SOURCE, total=Mounted(rotation(wanted), LEVER))
+        found = answer(BOAT.placed(rotation(wanted | {"roll": roll}), LEVER), source)
+        assert found.verdict in ("wrong", "undecidable")
+        assert frozenset({key}) in codes(found)
+        assert codes(found) <= {frozenset({key}), frozenset({"attitudes"})}
+        (words,) = [one.words for one in found.explanations if key in one.keys]
+        said = re.match(r"roll was entered as (.*)° in place of -48.7612°", words[0])
+        assert said is not None
+        assert float(said[1]) == pytest.approx(roll, abs=1e-9 if key == "exchanged" else 5e-4)
+    assert len(codes(found)) == 2  # without exchanged digits it may be the INS's alignment as well
+
+
+def test_an_order_of_rotations_is_still_named_whatever_its_values_differ_in() -> None:
+    wanted = {"roll": -48.7612, "pitch": 1.2051, "yaw": -1.9960}
+    typed = {"roll": -48.76, "pitch": 1.21, "yaw": -2.0}  # two decimals
+    source = replace(SOURCE, total=Mounted(rotation(wanted), LEVER))
+    found = answer(BOAT.placed(rotation(typed, "pitch yaw roll"), LEVER), source)
+    assert (found.verdict, codes(found)) == ("wrong", {frozenset({"order_pitch_yaw_roll"})})
+
+
+def test_exchanged_digits_of_the_lever_arm() -> None:
+    wanted, typed = LEVER * [1, 1, 0] + [0, 0, -2.0137], LEVER * [1, 1, 0] + [0, 0, -2.0317]
+    found = answer(BOAT.placed(RIGHT_R, typed), source=replace(SOURCE, total=Mounted(RIGHT_R, wanted)))
+    assert codes(found) == {frozenset({"exchanged"})}
+    assert "z was entered as -2.0317 m in place of -2.0137 m: two digits are exchanged" in found.explanations[0].words
 
 
 @pytest.mark.parametrize(("R", "expected"), [(RIGHT_R, "uncertain"), (rotation(ANGLES | {"roll": 48.8}), "wrong")])
@@ -134,3 +167,31 @@ def test_other_positions_in_each_pass_hide_a_centimetre_but_no_sign(R: np.ndarra
 
 def test_too_few_or_too_rough_soundings_cannot_tell() -> None:
     assert answer(BOAT.placed(RIGHT_R, LEVER), noise_m=1.0).verdict == "uncertain"
+
+
+@pytest.mark.parametrize("passes", [1, 2])
+def test_a_pass_with_the_old_values_is_not_passed_over(passes: int) -> None:
+    """The right mount explains most of the soundings exactly; the others were placed with the coarse one."""
+    old = np.arange(len(BOAT.x_mbes)) < passes * len(BOAT.x_mbes) // 4
+    found = answer(np.where(old[:, None], BOAT.placed(rotation(COARSE), COARSE_LEVER), BOAT.placed(RIGHT_R, LEVER)))
+    assert not found.is_right
+    assert found.excess_m > 0.02
+
+
+def test_outliers_are_no_second_mount() -> None:
+    points, random = BOAT.placed(RIGHT_R, LEVER), np.random.default_rng(2)
+    bad = random.random(len(points)) < 0.1
+    points[bad] += random.normal(0, 0.5, (bad.sum(), 3))
+    assert answer(points).is_right
+
+
+@pytest.mark.parametrize(("evenness", "expected"), [(0.6, "right"), (0.3, "uncertain")])
+def test_passes_that_were_not_found_may_lie_elsewhere(evenness: float, expected: str) -> None:
+    assert answer(BOAT.placed(RIGHT_R, LEVER), evenness=evenness).verdict == expected
+
+
+@pytest.mark.parametrize(("rolling", "expected"), [(1.0, "right"), (0.001, "uncertain")])
+def test_without_roll_and_pitch_no_z_is_proved_below_any_heights(rolling: float, expected: str) -> None:
+    boat = Boat((0.0, 0.0, 0.0, 0.0), rolling=rolling)
+    found = answer(boat.placed(RIGHT_R, LEVER) + np.array([0, 0, -8.3]), heights_differ=True, boat=boat)
+    assert found.verdict == expected

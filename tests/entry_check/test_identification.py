@@ -60,3 +60,27 @@ def test_another_session_or_a_grid_is_not_found(kind: str) -> None:
     if kind == "grid":
         points = np.unique(np.round(points / 0.25), axis=0) * 0.25
     assert identify(BOAT.soundings, file_of(points), STARTS) is None
+
+
+def test_pings_that_no_mount_explains_are_not_found() -> None:
+    """Each ping has the right distances between its beams, in the right order, but stands somewhere by itself."""
+    points, ping = BOAT.placed(ODD, ODD_LEVER), BOAT.soundings.ping
+    random = np.random.default_rng(8)
+    for one in np.unique(ping):
+        points[ping == one] = points[ping == one] @ rotation(
+            dict(zip(ANGLES, random.uniform(-30, 30, 3), strict=True))
+        ) + random.normal(0, 3, 3)
+    assert identify(BOAT.soundings, file_of(points), STARTS) is None
+
+
+@pytest.mark.parametrize(("moved_m", "is_even"), [(0.0, True), (0.7, False)])
+def test_a_pass_that_stands_elsewhere_is_missed_among_shuffled_soundings(moved_m: float, is_even: bool) -> None:
+    boat = Boat((0.0, 0.0, 0.0, 0.0))
+    points = boat.placed(rotation(ANGLES), LEVER)
+    points[len(points) // 4 : len(points) // 2] += moved_m
+    some = np.random.default_rng(3).permutation(len(points))[:4000]
+    pairs = identify(boat.soundings, file_of(points[some]), STARTS)
+    assert pairs is not None
+    assert pairs.how == "places"
+    assert (pairs.evenness > 0.7) == is_even
+    assert is_even or pairs.evenness < 0.2

@@ -58,3 +58,22 @@ def test_one_window_gives_its_whole_ping_but_for_beams_beyond_a_gap(reverse: boo
     assert found.tolist() == list(range(3 * BEAMS, 3 * BEAMS + 30))
     assert other.tolist() == where[place[found]].tolist()
     assert share == pytest.approx(30 / 40)
+
+
+def test_passes_in_another_order_are_all_found() -> None:
+    run = np.arange(900)
+    file = np.concatenate([np.arange(600, 900), np.arange(300, 600), np.arange(300)])  # where its three passes stand
+    found = in_order(Windows(run[:, None] + np.arange(5), file[:, None] + np.arange(5), 1))
+    assert found is not None
+    assert sorted(found.run_rows[:, 0].tolist()) == run.tolist()
+
+
+def test_a_sounding_that_the_file_holds_twice_has_two_pairs() -> None:
+    boat = Boat()
+    once = boat.placed(rotation(ANGLES), LEVER)
+    both = np.concatenate([once, once + np.array([0.1, 0.0, 0.0])])
+    own = 3 * BEAMS + np.arange(10, 15)
+    windows = Windows(np.stack([own, own]), np.stack([own, own + len(once)]), 1)
+    (found, other), _ = whole_pings(windows, boat.soundings, both, np.arange(len(both)), 0.002)
+    assert found.tolist() == np.repeat(3 * BEAMS + np.arange(BEAMS), 2).tolist()
+    assert set(other.tolist()) == {*found.tolist(), *(found + len(once)).tolist()}

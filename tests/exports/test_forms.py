@@ -143,7 +143,7 @@ def test_the_programs_own_code_makes_the_mount_of_the_numbers() -> None:
 def test_hvf_has_the_angles_in_one_place_and_the_time_of_the_first_pass(roll: float, place: str) -> None:
     text = export_text(TARGETS["caris-hvf"], mounting(mounted(roll, 0.0, 0.0)), Options())
     root = ET.fromstring(text)
-    holders = [sensor.tag for sensor in root if any(float(angle.get("Roll")) for angle in sensor.iter("MountAngle"))]
+    holders = [sensor.tag for sensor in root if any(float(angle.attrib["Roll"]) for angle in sensor.iter("MountAngle"))]
     assert holders == [place]
     assert {stamp.get("value") for stamp in root.iter("TimeStamp")} == {"2026-132 08:00:03"}
 
@@ -182,8 +182,37 @@ def test_qimeras_sheet_tells_the_transmitters_place_or_that_it_is_not_known() ->
     level = mounted(0.0, 0.0, 30.0, 0.1, 0.2, -1.0)
     sheet = export_text(TARGETS["qimera"], mounting(level, projector_offset_m=(0.0, 0.2, 0.0)), Options())
     x, y = 0.1 - 0.2 * np.sin(np.radians(30.0)), 0.2 + 0.2 * np.cos(np.radians(30.0))
-    assert f"Transmitter, m: X {x:.4f}, Y {y:.4f}, Z -1.0000." in sheet
+    assert f"Transmitter, m: X {x:.4f}, Y {y:.4f}, Z -1.0000. Receiver, m: X 0.1000, Y 0.2000, Z -1.0000." in sheet
     assert "--projector-offset" in export_text(TARGETS["qimera"], mounting(level), Options())
+
+
+def test_qimeras_sheet_wants_the_ins_where_the_values_count_it() -> None:
+    """With the INS apart from the reference point, its sensors at 0, 0, 0 would count its place twice."""
+    own = text_of("qimera")
+    assert "position and motion sensor stand at 0, 0, 0 there, without angles" in own
+    for frame in (VesselFrame((0.0, 0.0, 0.4)), VesselFrame(ins_turn_deg=(0.0, 0.0, 5.0))):
+        sheet = text_of("qimera", frame=frame)
+        assert "0, 0, 0" not in sheet
+        assert "motion sensor stand there as the INS does by --ins-point and --ins-turn" in sheet
+
+
+def test_qimeras_sheet_takes_kongsbergs_lever_arm_for_neither_array() -> None:
+    """It has x and z of the receiver, y of the transmitter: with the transmitter 0.2 m ahead the receiver is aft."""
+    level = mounted(0.0, 0.0, 0.0, 0.1, 0.2, -1.0)
+    apart = mounting(level, split=True, projector_offset_m=(0.05, 0.2, -0.1))
+    sheet = export_text(TARGETS["qimera"], apart, Options())
+    assert "Transmitter, m: X 0.1500, Y 0.2000, Z -1.1000. Receiver, m: X 0.1000, Y 0.0000, Z -1.0000." in sheet
+    unknown = export_text(TARGETS["qimera"], mounting(level, split=True), Options())
+    assert "the position above is of neither" in unknown
+    assert "receiver's" not in unknown
+
+
+@pytest.mark.parametrize("name", sorted(set(TARGETS) - {"kluster"}))
+def test_a_form_tells_what_was_estimated_with_the_mount(name: str) -> None:
+    """A mount found beside a latency is wrong without it."""
+    words = " ".join(text_of(name, origin=replace(ORIGIN, free=("its latency is 12 ms more",))).split())
+    assert "Estimated with the mount: its latency is 12 ms more. The values hold with that alone" in words
+    assert "Estimated with the mount" not in text_of(name)
 
 
 @pytest.mark.parametrize("name", sorted(set(TARGETS) - {"kluster"}))

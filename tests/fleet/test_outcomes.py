@@ -2,6 +2,7 @@
 
 import re
 import signal
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -131,6 +132,17 @@ def test_the_table_is_a_hundred_columns_wide_at_most(
     assert table[1].startswith("…")
     assert "2026-05-12 accepted" in " ".join(table[1].split())
     assert table[1].endswith(f" {shown}")
+
+
+def test_boats_with_sessions_of_one_day_are_told_apart(outcomes: list[Outcome]) -> None:
+    """The names differ only far in front: they get more room than the screen has, rather than one name for both."""
+    here = Path.cwd()
+    names = [f"data/{boat}/{'x' * 40}/2026-05-12" for boat in ("boat_a", "boat_b")]
+    table = outcome_table(
+        [replace(outcomes[0], session=FleetSession(here / name, here, here / name, "mbes", 0)) for name in names], {}
+    )
+    assert table[1].split()[0] != table[2].split()[0]
+    assert [row.split()[0][:3] for row in table[1:3]] == ["…a/", "…b/"]
 
 
 def test_lines_at_the_end_of_a_session_and_of_all(outcomes: list[Outcome]) -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.config.about import About
 from pipeline.results.pages.rendering import fonts_of
 from stages.commands.draw import Drawings, draw_missing
 from tests.support.left_english import assert_chinese, texts_of_page, watch_pictures
@@ -32,6 +33,7 @@ def screen(told: Told) -> list[str]:
 
 
 def test_an_accepted_run(done: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+    done.edit_session("", about={key: "甲" for key in About.model_fields if key != "instruments"})
     told = poolcal(*done.words())
     assert told.status == 0
     assert_chinese(screen(told) + drawn(done.run, monkeypatch), done.folder, *NAMES)

@@ -8,11 +8,13 @@ from scipy.stats import norm
 
 from pipeline.adjustment.parameter_strengths import SETS
 from pipeline.config.session import Drift
+from pipeline.language.chosen import translated
 from pipeline.report.cause_words import WORDS_OF_SETS
 from pipeline.report.drift_check import check_ins_drift
 from pipeline.report.reason_codes import ReasonCode
 from pipeline.report.verdict import explanations, rejections
 from tests.support.evidence import ADJUSTED, PASS_3, codes, drift, evidence, freed_table, judged, methods
+from tests.support.left_english import english_of
 
 ONE = {"sigma": 1e-4, "expected": 1e-4}
 
@@ -42,7 +44,8 @@ def test_of_several_causes_the_most_telling_is_named():
     freed = freed_table(sonar | {"value": 0.01}, laser | {"value": 0.002})
     (reason,) = judged(replace(evidence(), freed=freed))
     assert reason.code == ReasonCode.SUSPECTED_CAUSE
-    assert "strength 20): the laser's ranges: they should be +2.0 ± 0.1 mm longer; 1 other" in reason.words
+    assert "strength 20): the laser's ranges: they should be +2.0 ± 0.1 mm longer; other causes" in reason.words
+    assert reason.words.endswith("would explain it less well: 1")
 
 
 @pytest.mark.parametrize(("value", "is_named"), [(0.00181, True), (0.00179, False)])
@@ -55,7 +58,23 @@ def test_a_cause_within_two_sigmas_of_the_first_is_named_beside_it(value, is_nam
     assert "(strength 20): the sonar's ranges: they should be +2.0 ± 0.1 mm longer" in words
     nearly = "longer; nearly as well (strength 18): the laser's ranges: they should be +1.8 ± 0.1 mm"
     assert (nearly in words) == is_named
-    assert words.endswith(f"; {'1 other cause' if is_named else '2 other causes'} would explain it less well")
+    assert words.endswith(f"; other causes that would explain it less well: {1 if is_named else 2}")
+
+
+@pytest.mark.parametrize("number", [1, 2, 3])
+@pytest.mark.parametrize("further", [{}, {"by_session": 30.0}])
+def test_a_cause_is_in_chinese_whatever_stands_behind_it(monkeypatch, number, further):
+    one = {"expected": 1e-4, "sigma": 1e-4} | further
+    values = (("mbes_latency", 0.002), ("laser_range", 0.0019), ("mbes_level_range", 0.001))
+    freed = freed_table(*(one | {"unknown": name, "value": value} for name, value in values[:number]))
+    (reason,) = judged(replace(evidence(), freed=freed))
+    assert ("larger drift" in reason.words) == bool(further)
+    monkeypatch.setenv("POOLCAL_LANG", "zh")
+    words = translated(reason.words)
+    assert not list(english_of([words])), words
+    assert words.startswith("残差的可能原因（强度 ")
+    assert "）：声呐时钟：" in words
+    assert words.endswith("；解释程度较差的其他原因：1 个") == (number == 3 and not further)
 
 
 def test_a_known_error_is_as_strong_as_its_prior_information_lets_it_be():

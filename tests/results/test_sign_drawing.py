@@ -66,3 +66,17 @@ def test_the_lever_arm_is_to_scale() -> None:
 def test_a_laser_has_no_way_to_look() -> None:
     assert [len(straight(svg)) for svg in drawings(sonar=False).values()] == [1, 1, 1]
     assert [len(straight(svg)) for svg in drawings().values()] == [2, 2, 2]
+
+
+def test_names_of_axes_stand_clear() -> None:
+    """Letters are 13 high; a name of three is some 24 wide. No point of outline, axis or curved arrow lies in it."""
+    for svg in drawings().values():
+        outline = re.findall(r'polygon points="(.*?)"', svg)[0]
+        corners = np.array([pair.split(",") for pair in outline.split()], float) * (1, -1)
+        paths = [np.vstack([corners, corners[:1]]), *lines(svg)]
+        dense = np.vstack([a + (b - a) * t for path in paths for a, b in pairwise(path) for t in np.linspace(0, 1, 60)])
+        names = re.findall(r'<text x="(.*?)" y="(.*?)"[^>]*>([xyz]) \+<', svg)
+        assert len(names) == 2
+        for x, y, name in names:
+            right, up = dense[:, 0] - float(x), dense[:, 1] + float(y)
+            assert not np.any((np.abs(right) < 11) & (up > -1) & (up < 9)), name

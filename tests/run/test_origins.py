@@ -8,20 +8,22 @@ from typing import Any
 from pipeline.config.instruments import PRESETS
 from pipeline.config.load import load_pool, stated_keys
 from pipeline.config.session import SessionConfig
-from pipeline.results.pages.assumptions import assumed_groups
+from pipeline.config.yaml_file import read_yaml
+from pipeline.results.pages.assumptions import assumed_groups, drift_note
 from pipeline.results.pages.instrument_table import instrument_rows
 from pipeline.results.pages.rendering import render_page
-from pipeline.run.assumed_drift import assumed_drift
-from pipeline.run.origins import is_recorded
+from pipeline.run.origins import is_recorded, origin_of
 from pipeline.run.settings import Settings, read_settings, write_settings
 from tests.support.pages import Page
-from tests.support.preset_sessions import FOREIGN, session
+from tests.support.preset_sessions import FOREIGN, MOUNT, session
+
+SIGMAS = ("horizontal_m", "vertical_m", "roll_pitch_deg", "heading_deg")
 
 
 def _settings(folder: Path, found: SessionConfig) -> Settings:
     """The session with the demo's pool, as poolcal run has them: with the keys that the files state."""
     pool = PRESETS.parent / "defaults.yaml"
-    stated = {"session": stated_keys(folder / "session.yaml"), "config": stated_keys(pool)}
+    stated = {"session": stated_keys(read_yaml(folder / "session.yaml")), "config": stated_keys(read_yaml(pool))}
     return Settings(folder, load_pool(pool), found, {}, stated)
 
 
@@ -79,7 +81,8 @@ def test_an_older_run_does_not_claim_to_know(tmp_path: Path) -> None:
     origins = {row[2]: row[4] for row in _shown(older)[9:]}
     assert origins["angle_sigma_deg"] == "default, or the same in the file"
     assert [row[4] for row in _shown(older) if row[3] == "0.006"] == ["session"]
-    assert list(assumed_groups(older, False)) == []
+    assert origin_of(older, "target.faces.quay.1.corners", changed=True) == "pool"  # names of faces may have dots
+    assert list(assumed_groups(older, ())) == []
     assert not is_recorded(older)
 
 
@@ -88,30 +91,91 @@ def _said(groups: Iterable[Mapping[str, Any]]) -> str:
 
 
 def test_the_certificate_names_what_nobody_stated(tmp_path: Path) -> None:
-    groups = _said(assumed_groups(_settings(tmp_path, session(tmp_path)), False))
+    groups = _said(assumed_groups(_settings(tmp_path, session(tmp_path)), ()))
     assert "slow errors of the INS (horizontal 15 mm, vertical 20 mm, roll and pitch 0.01°" in groups
     assert "the laser's own mount (angles 0.005°, lever arm 1.5 mm)" in groups
     assert "clocks (of the laser 0.2 ms, of the sonar 0.5 ms)" in groups
     assert "sound speed (0.2 m/s, 0.1 m/s per metre of depth)" in groups
     stated = {"mount_sigma": {"angle_deg": 0.005}, "latency_sigma_s": 0.0002}
     found = session(tmp_path, laser=stated, ins={"drift": {"heading_deg": 0.03}})
-    groups = _said(assumed_groups(_settings(tmp_path, found), False))
+    groups = _said(assumed_groups(_settings(tmp_path, found), ()))
     assert "the laser's own mount (lever arm 1.5 mm)" in groups
     assert "clocks (of the sonar 0.5 ms)" in groups
     assert "heading" not in groups
-    of_files = _said(assumed_groups(_settings(tmp_path, session(tmp_path)), True))
-    assert "slow errors of the INS (time constant 200 s)" in of_files
 
 
-def test_the_note_on_the_drift_is_there_only_where_nobody_stated_it(tmp_path: Path) -> None:
+def test_of_the_drift_each_figure_that_no_file_gave_is_named(tmp_path: Path) -> None:
+    """An export may hold accuracies of positions alone."""
     plain = _settings(tmp_path, session(tmp_path))
-    assert "its drift is assumed: 0.015 m horizontal, 0.02 m vertical, 0.01°" in assumed_drift(plain, False)
-    assert assumed_drift(plain, True) == ""
-    assert assumed_drift(replace(plain, stated={}), False) == ""
-    given = _settings(tmp_path, session(tmp_path, ins={"drift": {"heading_deg": 0.03}}))
-    assert assumed_drift(given, False) == ""
-    ins = {"title": "I", "sensor": "ins", "settings": {"drift": {"heading_deg": 0.03}}}
-    assert assumed_drift(_settings(tmp_path, session(tmp_path, {"mine": ins}, ins={"instrument": "mine"})), False) == ""
+    every = ("horizontal_m", "vertical_m", "roll_pitch_deg", "heading_deg")
+    assert "slow errors of the INS (time constant 200 s)" in _said(assumed_groups(plain, every))
+    assert "slow errors of the INS (roll and pitch 0.01°, heading 0.03°, time constant 200 s)" in (
+        _said(assumed_groups(plain, every[:2]))
+    )
+
+
+def _of_laser(folder: Path, **laser: Any) -> Settings:
+    """A session without a sonar, in a pool whose config states nothing."""
+    settings = _settings(folder, session(folder, laser=laser).model_copy(update={"mbes": None}))
+    return replace(settings, stated={**settings.stated, "config": ()})
+
+
+def test_what_the_laser_s_own_calibration_assumes(tmp_path: Path) -> None:
+    """Errors of single faces enter it; those of wet faces and of the laser's own mount do not."""
+    settings = _of_laser(tmp_path)
+    groups = _said(assumed_groups(settings, ()))
+    assert "the coarse mount (angles 0.5°, lever arm 50 mm)" in groups
+    assert "the target as built (single faces 0.5 mm, directions of its faces 0.02°" in groups
+    assert "wet" not in groups
+    assert "own mount" not in groups
+    shown = {row[2]: row[3] for row in _shown(settings)}
+    assert shown["as_built.face_sigma_m"] == "0.0005"
+    assert "as_built.offset_sigma_m" not in shown
+
+
+def test_the_covariance_that_poolcal_laser_wrote_is_none_of_the_coarse_mount(tmp_path: Path) -> None:
+    covariance = [[1e-8 * (row == column) for column in range(6)] for row in range(6)]
+    by_coarse = {"method": "coarse", "file": "marks.csv", "sha256": 64 * "0", "date": "2026-05-12"}
+    by_coarse |= {"software": "poolcal"}
+    by_laser = by_coarse | {"method": "fine", "mount": MOUNT}
+    for origin, assumed in (
+        (None, False),
+        (by_coarse, False),
+        (by_laser | {"coarse": {"mount": MOUNT, "covariance": None}}, True),
+        (by_laser | {"coarse": {"mount": MOUNT, "covariance": covariance}}, False),
+        (by_laser, True),  # of an older version: it counts for the values that were held alone
+    ):
+        stated: dict[str, Any] = {"mount_covariance": covariance} | ({"mount_origin": origin} if origin else {})
+        groups = _said(assumed_groups(_of_laser(tmp_path, **stated), ()))
+        assert ("the coarse mount" in groups) == assumed, origin
+
+
+def test_the_certificate_names_what_the_ins_s_files_do_not_give(tmp_path: Path) -> None:
+    """A log with an accuracy of the heading alone leaves the others to the program."""
+    groups = _said(assumed_groups(_settings(tmp_path, session(tmp_path)), ("heading_deg",)))
+    assert "INS (horizontal 15 mm, vertical 20 mm, roll and pitch 0.01°, time constant 200 s)" in groups
+
+
+def test_the_note_on_the_drift_names_the_figures_that_nobody_stated(tmp_path: Path) -> None:
+    plain = _settings(tmp_path, session(tmp_path))
+    every = "horizontal 15 mm, vertical 20 mm, roll and pitch 0.01°, heading 0.03°, time constant 200 s"
+    assert drift_note(plain, ()).endswith(f"nor the INS's log states them: {every}")
+    assert drift_note(plain, SIGMAS) == ""  # but for the time constant
+    assert drift_note(plain, SIGMAS[1:]).endswith("states them: horizontal 15 mm, time constant 200 s")
+    assert drift_note(replace(plain, stated={}), ()) == ""
+    whole = dict.fromkeys(SIGMAS, 0.02)
+    assert drift_note(_settings(tmp_path, session(tmp_path, ins={"drift": whole})), ()) == ""
+
+
+def test_a_part_of_the_drift_that_is_stated_does_not_silence_the_note(tmp_path: Path) -> None:
+    """Stated in part, ins.drift goes before the log's accuracies, and the rest is the program's."""
+    note = drift_note(_settings(tmp_path, session(tmp_path, ins={"drift": {"heading_deg": 0.05}})), ())
+    assert note.endswith("no accuracies of the INS's log are used: horizontal 15 mm, vertical 20 mm, "
+                         "roll and pitch 0.01°, time constant 200 s")  # fmt: skip
+    ins = {"title": "I", "sensor": "ins", "settings": {"drift": {"heading_deg": 0.05}}}
+    of_preset = _settings(tmp_path, session(tmp_path, {"mine": ins}, ins={"instrument": "mine"}))
+    assert "heading" not in drift_note(of_preset, ())
+    assert "nor the INS's log states them: horizontal 15 mm" in drift_note(of_preset, ())
 
 
 def test_the_stated_keys_are_kept_in_run_yaml(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from pipeline.config.yaml_file import content_of
 from pipeline.config.yaml_models import parse
 from pipeline.maths.mount_parameters import SETTINGS
 from pipeline.readers.session_files import files_matching
-from pipeline.starting.assumed import about, assumed
+from pipeline.starting.figure_comments import about_comments, figure_comments
 from pipeline.starting.file_patterns import patterns_for
 from pipeline.starting.folder_files import LeftOut
 from pipeline.starting.left_out_words import left_out_lines
@@ -101,12 +101,12 @@ def test_what_is_assumed_is_what_the_program_takes() -> None:
         ("mbes", Mbes, {"format": "r2sonic", "mount": dict.fromkeys(SETTINGS, 0.0)}),
     ]
     for sensor, block, given in sensors:
-        lines = [line.removeprefix("  # ") for line in assumed(sensor, has_preset=False)]
+        lines = [line.removeprefix("  # ") for line in figure_comments(sensor, has_preset=False)]
         stated = yaml.safe_load("\n".join(line for line in lines if re.match(r"\w+: [{\[\d]", line)))
         without = block(**files, **given).model_dump(mode="json")
         source = {"drift_from": "settings"} if sensor == "ins" else {}  # what is written overrides the files
         assert parse(block, files | given | stated, "a").model_dump(mode="json") == without | source
-        assert "".join(assumed(sensor, has_preset=True)).count("range_sigma_m") == 0
-    keys = yaml.safe_load("\n".join(line.removeprefix("# ") for line in about() if line.endswith(":")))
+        assert "".join(figure_comments(sensor, has_preset=True)).count("range_sigma_m") == 0
+    keys = yaml.safe_load("\n".join(line.removeprefix("# ") for line in about_comments() if line.endswith(":")))
     assert About(**keys["about"]) == About()
     assert len(keys["about"]) == 6

@@ -31,12 +31,14 @@ SOURCE = EntrySource(
 class Boat:
     """Sails one course after the other past points about 6 m to starboard, rolling and pitching."""
 
-    def __init__(self, headings_deg: tuple[float, ...] = (0.0,), speed_m_s: float = 1.0, seed: int = 1) -> None:
+    def __init__(
+        self, headings_deg: tuple[float, ...] = (0.0,), speed_m_s: float = 1.0, seed: int = 1, rolling: float = 1.0
+    ) -> None:
         random = np.random.default_rng(seed)
         t_s = np.arange(0.0, (PINGS + 20) * PING_S * len(headings_deg), 0.02)
         course = np.minimum((t_s // ((PINGS + 20) * PING_S)).astype(int), len(headings_deg) - 1)
         heading = np.array(headings_deg)[course] + 1.5 * np.sin(t_s / 1.7)
-        roll, pitch = 2.0 * np.sin(t_s / 0.9), 1.2 * np.sin(t_s / 1.3)
+        roll, pitch = rolling * 2.0 * np.sin(t_s / 0.9), rolling * 1.2 * np.sin(t_s / 1.3)
         self.attitude = Rotation.from_euler("ZXY", np.stack([-heading, pitch, roll], 1), degrees=True)
         way = np.cumsum(speed_m_s * (1 + 0.3 * np.sin(t_s / 2))) * 0.02
         east, north = np.sin(np.radians(heading)), np.cos(np.radians(heading))

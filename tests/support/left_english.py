@@ -90,8 +90,8 @@ def watch_pictures(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     save = Figure.savefig
 
     def watched(figure: Figure, *words: Any, **values: Any) -> None:
+        save(figure, *words, **values)  # drawing makes the texts at the ticks anew
         found.extend(text.get_text() for text in figure.findobj(Text))
-        save(figure, *words, **values)
 
     monkeypatch.setattr(Figure, "savefig", watched)
     return found

@@ -18,8 +18,8 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import pandas as pd
 
 import pipeline.readers.dispatch
+import pipeline.results.pages.assumptions
 import pipeline.results.screen
-import pipeline.run.assumed_drift
 import stages
 import stages.commands.draw
 from pipeline.artefacts.catalogue.results import CALIBRATION_JSON
@@ -77,7 +77,7 @@ def install(put: Callable[[object, str, object], object]) -> dict[str, types.Mod
         pipeline.results.screen, "summary",
         lambda calibration: f"{calibration['session']}: {calibration['verdict']}",
     )  # fmt: skip
-    put(pipeline.run.assumed_drift, "note_of_run", lambda *_: "")  # nor an INS
+    put(pipeline.results.pages.assumptions, "note_of_run", lambda *_: "")  # nor an INS
     take, sift, _ = toys.stages()
     take.__name__, sift.__name__ = "stages.take", "stages.sift"
     put(stages, "ORDER", ("take", "sift", "report"))

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from PIL import Image
 
 from tests.support.places import Place, poolcal
@@ -19,6 +20,7 @@ FULL: dict[str, Any] = {
     "weather": "overcast, wind 2 m/s", "water_temperature": "17.4 °C at 1 m", "datum": "CGCS2000", "epoch": "2026.36",
     "ins_reference_point": "centre of the IMU's housing", "laser_calibration": "certificate C-2201 of 2026-02-03",
     "target_survey": "total station, 2026-04-28, sheet 3", "sound_speed": "cast at 07:50 UTC",
+    "remarks": "trial before the harbour survey; the second pass was sailed twice because of a passing tug",
     "instruments": {
         sensor: {"make": "Example", "model": "One 2000", "serial": "NMND21340012L", "firmware": "OM7MR0810"}
         for sensor in ("ins", "laser", "mbes", "sound_speed_probe")
@@ -45,10 +47,10 @@ def place(run: Path, small: Path, tmp_path: Path) -> Place:
     return made
 
 
-def printed(place: Place, program: str) -> Path:
-    """The run's PDF."""
+def printed(place: Place, program: str, *more: str) -> Path:
+    """The run's PDF; ``more``: further options."""
     pdf = place.folder / "水池 report.pdf"
-    told = poolcal("report", place.run, "--pdf", pdf)
+    told = poolcal("report", place.run, "--pdf", pdf, *more)
     assert (told.status, told.err) == (0, "")
     assert program in told.out
     return pdf
@@ -83,6 +85,10 @@ def test_a_certificate_is_two_sheets(place: Place, program: str) -> None:
     for number, sheet in enumerate(sheets, 1):
         assert f"{number}/{len(sheets)}" in sheet
     assert marks_on(pdf)[:2] == [0, 0]
+    name = "".join(yaml.safe_load((place.run / "run.yaml").read_text(encoding="utf-8"))["session"]["name"].split())
+    assert [sheet.count(name) for sheet in sheets[:2]] == [1, 1]  # large on the first, in the margin of the next
+    alone = [sheet.replace(f"{number}/{len(sheets)}", f"{number}/2") for number, sheet in enumerate(sheets[:2], 1)]
+    assert sheets_of(printed(place, program, "--certificate")) == alone
 
 
 def test_a_rejected_run_is_marked_on_every_sheet(place: Place, program: str) -> None:
@@ -93,3 +99,6 @@ def test_a_rejected_run_is_marked_on_every_sheet(place: Place, program: str) -> 
     assert len(sheets) == len(marks) > 5
     assert min(marks) > 100
     assert not any("signature" in sheet for sheet in sheets)
+    alone = printed(place, program, "--certificate")
+    assert len(sheets_of(alone)) == len(marks_on(alone)) == 2
+    assert min(marks_on(alone)) > 100

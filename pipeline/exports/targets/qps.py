@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from pipeline.exports.convention import SFU, Convention
 from pipeline.exports.mounting import Mounting
+from pipeline.exports.reading import written
 from pipeline.exports.sheet import DECIMALS, Sheet
 from pipeline.exports.target import Options, Target
 
@@ -24,15 +25,36 @@ ANGLES = {"roll": "Roll", "pitch": "Pitch", "yaw": "Heading"}
 
 
 def _arrays(target: Target, mounting: Mounting, _: Options) -> list[str]:
-    """Return what stands for the transmitter, where the editor has it apart from the receiver."""
+    """Return what stands for transmitter and receiver, where the editor has them apart.
+
+    The lever arm is the receiver's, but with the transmitter's y where Kongsberg's files tell both (``split``).
+    """
+    if mounting.projector_offset_m is None and mounting.split:
+        return [
+            "If the editor has transmitter and receiver apart, the position above is of neither (forward of the",
+            "transmitter, starboard and up of the receiver): export again with --projector-offset.",
+        ]
     if mounting.projector_offset_m is None:
         return [
             "If the editor has transmitter and receiver apart: the same angles in both; the position above is the",
             "receiver's. For the transmitter's export again with --projector-offset (0 0 0: both at one point).",
         ]
-    place = target.convention.numbers(mounting.arrays()[0]).by_role()
-    where = ", ".join(f"{name} {place[role]:.{DECIMALS}f}" for role, name in POSITION.items())
-    return [f"If the editor has transmitter and receiver apart: the same angles in both. Transmitter, m: {where}."]
+    places = [target.convention.numbers(mounted).by_role() for mounted in mounting.arrays()]
+    transmitter, receiver = (
+        ", ".join(f"{name} {written(place[role], DECIMALS)}" for role, name in POSITION.items()) for place in places
+    )
+    return [
+        "If the editor has transmitter and receiver apart: the same angles in both.",
+        f"Transmitter, m: {transmitter}. Receiver, m: {receiver}.",
+    ]
+
+
+def _as_in_qimera(target: Target, mounting: Mounting, options: Options) -> list[str]:
+    """Return what must stand in the editor beside the values: the two arrays, and the INS as the values count on it."""
+    ins = "at 0, 0, 0 there, without angles of their own"
+    if not mounting.frame.is_ins:
+        ins = "there as the INS does by --ins-point and --ins-turn (below)"
+    return [*_arrays(target, mounting, options), f"The values hold if position and motion sensor stand {ins}."]
 
 
 _QINSY = Sheet(
@@ -54,9 +76,8 @@ _QIMERA = Sheet(
     zeros="Must be zero: the calibration (patch test) results of the same sonar that Qimera's own tool has stored.",
     notes=(
         "Loading a session replaces what stands in the vessel editor: enter the values after the import.",
-        "They hold if position and motion sensor stand at 0, 0, 0 there, without angles of their own.",
     ),
-    extra=_arrays,
+    extra=_as_in_qimera,
 )
 QINSY = _QINSY.target("qinsy", "QPS Qinsy", CONVENTION)
 QIMERA = _QIMERA.target("qimera", "QPS Qimera", OF_QIMERA)

@@ -209,7 +209,7 @@ def weakest_direction(covariance: Array) -> str:
     if pair is None:
         worst = int(np.argmax(sigma[:3])), 3 + int(np.argmax(sigma[3:]))
         first, second = (MOUNT_WORDS[k] for k in worst)
-        return f"no two are strongly correlated; the least certain are {first} and {second}"
+        return f"no correlation of two reaches {CORRELATION_LIMIT:.2f}; the least certain are {first} and {second}"
     row, column, rho = pair
     times = 1 / np.sqrt(max(1 - rho**2, 1e-6))
     return (

@@ -36,7 +36,6 @@ IF_GIVEN = {
     "epoch": "epoch", "remarks": "remarks",
 }
 SENSORS = {"ins": "INS", "laser": "laser scanner", "mbes": "sonar", "sound_speed_probe": "sound speed probe"}
-NOT_STATED = "not stated"
 
 
 def certificate_values(
@@ -80,7 +79,7 @@ def certificate_values(
         "soundings": _soundings(block["covariance_total"]) if sonar and block["covariance_total"] else None,
         "done": _done(result, sonar),
         "speed": _speed(tables.table(PASSES)),
-        "assumed": list(assumed_groups(settings, bool(result["ins_drift"]["from_files"]))),
+        "assumed": list(assumed_groups(settings, result["ins_drift"]["from_files"])),
         "assumed_recorded": is_recorded(settings),
         "digests": _digests(manifests, result, settings),
     }
@@ -101,7 +100,10 @@ def identity_rows(about: About) -> list[Row]:
 
 
 def instruments_on_board(session: SessionConfig) -> list[Row]:
-    """Return a row for each instrument: the words of ``about``, or else the title of the session's preset."""
+    """Return for each instrument its cells: what it is, serial number and firmware; None: it is not stated.
+
+    What it is stands in ``about``, or else in the title of the session's preset.
+    """
     rows: list[Row] = []
     for key, sensor in SENSORS.items():
         about = getattr(session.about.instruments, key)
@@ -109,9 +111,9 @@ def instruments_on_board(session: SessionConfig) -> list[Row]:
         if block is None and about == type(about)():
             continue
         preset = getattr(block, "instrument", None)
-        title = " ".join(filter(None, [about.make, about.model])) or (preset.title if preset else NOT_STATED)
-        more = {name: getattr(about, name) or NOT_STATED for name in ("serial", "firmware")}
-        rows.append({"sensor": sensor, "title": title, "remarks": about.remarks} | more)
+        title = " ".join(filter(None, [about.make, about.model])) or (preset.title if preset else None)
+        words = "; ".join(filter(None, [title, about.remarks])) or None
+        rows.append({"sensor": sensor, "cells": (words, about.serial, about.firmware)})
     return rows
 
 

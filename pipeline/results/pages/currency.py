@@ -9,10 +9,13 @@ from pathlib import Path
 from pipeline.atomic_files import sha256
 from pipeline.language.chosen import language
 from pipeline.run import manifest
+from pipeline.run.import_closure import import_closure
+from pipeline.run.provenance import ROOT
 from pipeline.run.results import PAGE, agreeing
 from pipeline.run.settings import read_settings
 
 HEAD = 2000  # bytes at the start of the page that contain its digest
+DRAWING = ("pipeline.results.pages.report", "pipeline.results.pages.plots")  # modules that make page and pictures
 
 
 def page_digest(run: Path, manifests: Mapping[str, manifest.Manifest]) -> str:
@@ -27,14 +30,26 @@ def page_digest(run: Path, manifests: Mapping[str, manifest.Manifest]) -> str:
     """
     shown = [[stage, of_stage.outputs, of_stage.key.raw] for stage, of_stage in manifests.items()]
     settings = read_settings(run)
-    content = [shown, settings.as_json(), dict(settings.files), dict(settings.stated), _drawn_by(), language()]
+    drawn_by = drawing_digests(ROOT, language())
+    content = [shown, settings.as_json(), dict(settings.files), dict(settings.stated), drawn_by, language()]
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 @functools.cache
-def _drawn_by() -> list[str]:
-    """Return the digests of the files in this folder: a newer program draws the page anew."""
-    files = sorted(path for path in Path(__file__).parent.iterdir() if path.suffix in (".py", ".html"))
+def drawing_digests(root: Path, code: str) -> list[str]:
+    """Return the digests of all that makes the page: a newer program, or a better translation, draws it anew.
+
+    Words of the page come from many packages, so that all modules count that its own can reach by imports.
+
+    Parameters
+    ----------
+    root
+        The folder in which the package ``pipeline`` lies.
+    code
+        The language.
+    """
+    catalogue = root / "pipeline" / "language" / code / "poolcal.po"
+    files = import_closure(root, DRAWING) + ([catalogue] if catalogue.is_file() else [])
     return [sha256(path) for path in files]
 
 

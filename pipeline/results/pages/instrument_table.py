@@ -44,13 +44,20 @@ def instrument_rows(settings: Settings, drift: Mapping[str, Any]) -> list[Row]:
                     "unverified": of_preset and preset is not None and key in preset.unverified,
                 }
             )
-    block, model = ("as_built", AsBuilt) if settings.session.calibrated == "mbes" else ("laser_fit", LaserFit)
-    for number, name in enumerate(name for name in model.model_fields if "sigma" in name):
-        key = f"{block}.{name}"
+    for number, key in enumerate(_of_target(settings)):
         row = {"key": key, "value": _shown(value_of(settings, key)), "origin": origin_of(settings, key)}
         first = {"sensor": "" if number else "target", "instrument": "" if number else "–"}
         rows.append(first | row | {"unverified": False})
     return rows
+
+
+def _of_target(settings: Settings) -> list[str]:
+    """Return the keys of the target's figures, in the pool's config, that enter this calibration."""
+    as_built, laser_fit = (
+        [f"{block}.{name}" for name in model.model_fields if "sigma" in name]
+        for block, model in (("as_built", AsBuilt), ("laser_fit", LaserFit))
+    )
+    return as_built if settings.session.calibrated == "mbes" else ["as_built.face_sigma_m", *laser_fit]
 
 
 def _figures(settings: Settings, sensor: Sensor, drift: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:

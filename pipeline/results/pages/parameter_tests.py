@@ -48,7 +48,7 @@ def parameter_test_rows(freed: pd.DataFrame, level: float) -> Iterator[Mapping[s
 
 
 def untold_parameters(freed: pd.DataFrame) -> list[str]:
-    """Return in words the parameters that move the mount, and of which the points tell nothing."""
+    """Return in words the parameters that move the mount, and of which the points tell nothing, each wording once."""
     words = []
     for row in freed[~np.isfinite(freed["expected"]) & ~freed["estimated"]].to_dict("records"):
         name = str(row["unknown"])
@@ -56,7 +56,7 @@ def untold_parameters(freed: pd.DataFrame) -> list[str]:
         if moves and name not in MOUNT_NAMES and not name.startswith((SINGLE_FACE, OF_DESIGN)):
             axis = f", {name[-1]}" if name[-2:] in ("_x", "_y", "_z") else ""
             words.append(f"{source_of(name).words}{axis} (± {_shown(name, row['considered'])})")
-    return words
+    return list(dict.fromkeys(words))
 
 
 def _shown(name: str, value: float) -> str:

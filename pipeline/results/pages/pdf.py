@@ -25,7 +25,7 @@ MISSING = (
 MADE = re.compile(rb"(/(?:CreationDate|ModDate)\s*\(D:)\d{14}([^)]*)")  # times in what Chromium writes
 
 
-def write_pdf(page: Path, file: Path) -> str:
+def write_pdf(page: Path, file: Path, certificate: bool = False) -> str:
     """Write an HTML page as PDF, whole or not at all, and return the name of the program that made it.
 
     Parameters
@@ -34,23 +34,30 @@ def write_pdf(page: Path, file: Path) -> str:
         The page, complete in itself.
     file
         The PDF.
+    certificate
+        Whether to print the certificate's two pages of a report alone; they are numbered by themselves.
 
     Raises
     ------
     ArtefactError
         Neither WeasyPrint nor a Chromium is here, or it did not write the file.
     """
+    text = page.read_text(encoding="utf-8")
+    if certificate:
+        text = text.replace("<body>", '<body class="certificate">', 1)  # the page's style hides the rest on paper
     library = _weasyprint()
     if library is not None:
         fetcher = library.urls.URLFetcher(allowed_protocols=("data",))  # nothing beyond the page is read
-        html = library.HTML(string=page.read_text(encoding="utf-8"), url_fetcher=fetcher)
+        html = library.HTML(string=text, url_fetcher=fetcher)
         write_bytes(file, bytes(html.write_pdf()))
         return f"WeasyPrint {library.__version__}"
     browser = next((path for name in CHROMIUMS if (path := shutil.which(name))), None)
     if browser is None:
         raise ArtefactError(MISSING.format(page=page))
     with temporary_folder() as place:
-        write_bytes(file, _printed(browser, page, place))
+        shown = place / "page.html"
+        shown.write_text(text, encoding="utf-8")
+        write_bytes(file, _printed(browser, page, shown, place))
     return Path(browser).name
 
 
@@ -63,13 +70,25 @@ def _weasyprint() -> Any:
     return weasyprint if hasattr(weasyprint.urls, "URLFetcher") else None
 
 
-def _printed(browser: str, page: Path, place: Path) -> bytes:
-    """Return the page as the browser prints it; ``place``: an empty folder for its profile and its output."""
+def _printed(browser: str, page: Path, shown: Path, place: Path) -> bytes:
+    """Return a page as the browser prints it.
+
+    Parameters
+    ----------
+    browser
+        The browser.
+    page
+        The page, for messages.
+    shown
+        What of it is printed, as a page of its own.
+    place
+        A folder for the browser's profile and its output.
+    """
     made = place / "page.pdf"
     sandbox = ["--no-sandbox"] if os.geteuid() == 0 else []  # the browser has none for root
     command = [
         browser, "--headless=new", "--disable-gpu", *sandbox, *ALONE, f"--user-data-dir={place / 'profile'}",
-        "--no-pdf-header-footer", f"--print-to-pdf={made}", page.absolute().as_uri(),
+        "--no-pdf-header-footer", f"--print-to-pdf={made}", shown.as_uri(),
     ]  # fmt: skip
     try:
         nowhere = subprocess.DEVNULL

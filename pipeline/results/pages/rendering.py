@@ -18,6 +18,7 @@ from markupsafe import Markup
 from matplotlib import font_manager
 from matplotlib.figure import Figure
 from matplotlib.text import Text
+from matplotlib.ticker import FixedLocator
 
 from pipeline.language.chosen import ENGLISH, language, translated
 from pipeline.language.html_text import translated_page
@@ -108,6 +109,12 @@ def _translate(figure: Figure) -> None:
         if words != text.get_text():
             text.set_text(words)
             text.set_fontfamily([*fonts, *text.get_fontfamily()])
+    for axis in (one for axes in figure.axes for one in (axes.xaxis, axes.yaxis)):
+        if isinstance(axis.get_major_locator(), FixedLocator):  # drawing makes the texts at its ticks anew
+            texts = axis.get_ticklabels()
+            before = [text.get_text() for text in texts]
+            if (after := [translated(words) for words in before]) != before:
+                axis.set_ticklabels(after, fontfamily=[*fonts, *texts[0].get_fontfamily()])
 
 
 @functools.cache

@@ -150,6 +150,7 @@ def _result_values(
 
 def _residual_values(tables: Tables, result: Row, settings: Settings) -> Row:
     """Return the template's values about the residuals."""
+    codes = [*result["reason_codes"], *result["warning_codes"]]
     return {
         "largest": _largest(tables.table(CELLS)),
         "tolerated": f"{1000 * settings.pool.adjust.test_tolerance_m:g}",
@@ -160,7 +161,7 @@ def _residual_values(tables: Tables, result: Row, settings: Settings) -> Row:
         "parameter_tests": list(parameter_test_rows(tables.table(FREED), settings.pool.adjust.test_level)),
         "groups": tables.table(GROUPS).to_dict("records"),
         "drift_figures": drift_rows(tables.table(DRIFT_FIGURES)),
-        "drift_in_words": drift_sentence(tables.table(DRIFT_FIGURES)),
+        "drift_in_words": drift_sentence(tables.table(DRIFT_FIGURES), codes),
         "summary": tables.table(ADJUST_SUMMARY).to_dict("records")[0],
     }
 
@@ -225,7 +226,7 @@ def _origin(settings: Settings, key: str) -> str:
 
     A list of blocks, or a block whose keys are free names, is given as a whole.
     """
-    origin = origin_of(settings, key)
+    origin = origin_of(settings, key, changed=True)
     if origin != DEFAULT:
         return origin
     stated = [one for keys in settings.stated.values() for one in keys]

@@ -22,7 +22,7 @@ LETTERS = "xyz"
 REACH = 62.0  # length of the longest part of a lever arm, in units of the drawing; the view is 200 wide and 200 high
 RADIUS, TURN_DEG = 82.0, 40.0  # of the curved arrows
 LOOK = 30.0  # length of the line along which the sonar looks
-PROW = ((-34, 66), (34, 66), (34, -50), (0, -84), (-34, -50))
+PROW = ((-30, 66), (30, 66), (30, -50), (0, -84), (-30, -50))
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class View:
 
 VIEWS = (
     View("from behind", 0, 2, "roll", (1, 0, 0), (6, 24), ((-46, -16), (46, -16), (34, 24), (-34, 24))),
-    View("from starboard", 1, 2, "pitch", (0, 1, 0), (6, -12), ((-66, -16), (84, -16), (56, 24), (-60, 24))),
+    View("from starboard", 1, 2, "pitch", (0, 1, 0), (6, -12), ((-66, -16), (84, -16), (64, 24), (-60, 24))),
     View("from above", 0, 1, "yaw", (0, 1, 0), (-14, 22), PROW),
 )
 
@@ -80,10 +80,10 @@ def _svg(view: View, mount: Mounted, sonar: bool) -> Markup:
     scale = REACH / max(1.0, float(np.abs(mount.lever_arm_body_m).max()))
     sensor = _flat(view, scale * mount.lever_arm_body_m)
     shapes = [f'<polygon points="{_points(view.outline)}" fill="#eef1f4" stroke="{QUIET}"/>']
-    for axis in (view.right, view.up):
+    for axis, beside in ((view.right, (-3, 17)), (view.up, (16, 12))):  # names clear of outlines and curved arrows
         end = _flat(view, 54.0 * np.eye(3)[axis])
         shapes += _arrow([np.zeros(2), end], INK, 1.2)
-        shapes.append(_letter(f"{LETTERS[axis]} +", 1.36 * end + (0, 5), INK))
+        shapes.append(_letter(f"{LETTERS[axis]} +", end + beside, INK))
     steps = np.linspace(0.0, TURN_DEG, 21)
     arc = [_flat(view, RADIUS * turned(view.angle, float(degrees), np.array(view.begins))) for degrees in steps]
     shapes += _arrow(arc, colour, 2.4)

@@ -28,7 +28,7 @@ def covariance_of(rho: float) -> np.ndarray:
 def test_two_move_together_from_where_it_doubles_their_sigma(sign: float) -> None:
     below, above = covariance_of(sign * (CORRELATION_LIMIT - 0.001)), covariance_of(sign * (CORRELATION_LIMIT + 0.001))
     assert correlated_pair(below) is None
-    assert weakest_direction(below) == "no two are strongly correlated; the least certain are yaw and lever arm y"
+    assert weakest_direction(below) == "no correlation of two reaches 0.87; the least certain are yaw and lever arm y"
     found = correlated_pair(above)
     assert found is not None
     assert found[:2] == (YAW, ARM_Y)

@@ -17,7 +17,7 @@ _NOISE = {  # of a sensor without a preset
 _ON_THE_CERTIFICATE = ("vessel", "client", "place", "surveyor", "laser_calibration", "target_survey")
 
 
-def assumed(sensor: Sensor, has_preset: bool) -> Iterator[str]:
+def figure_comments(sensor: Sensor, has_preset: bool) -> Iterator[str]:
     """Yield the comments on a sensor's figures, each with the line to take the comment sign from.
 
     Parameters
@@ -46,7 +46,7 @@ def assumed(sensor: Sensor, has_preset: bool) -> Iterator[str]:
         )
 
 
-def about() -> Iterator[str]:
+def about_comments() -> Iterator[str]:
     """Yield the comments on the block about, with the keys that every certificate should have."""
     yield from comment("What the certificate says of boat and people; all keys: docs/certificate.md.")
     yield "# about:"
