@@ -9,7 +9,8 @@ import pytest
 
 from stages import ORDER
 from stages.commands.draw import Drawings, draw_missing
-from tests.support.places import Place, Told, digests, poolcal, simulate
+from tests.support.places import Place, Told, digests, poolcal, result_of, simulate
+from tools.survey_software import Entry, Recording, entry_of, recording
 
 
 @pytest.fixture(scope="session")
@@ -37,6 +38,24 @@ def undisturbed(small: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[
 def right(undisturbed: tuple[Path, Told]) -> dict[str, str]:
     """Digests of every Parquet file of the undisturbed run."""
     return digests(undisturbed[0])
+
+
+@pytest.fixture(scope="session")
+def finished(undisturbed: tuple[Path, Told]) -> Path:
+    """The run folder of the undisturbed run."""
+    return undisturbed[0]
+
+
+@pytest.fixture(scope="session")
+def recorded(small: Path) -> Recording:
+    """What a survey software reads of the session."""
+    return recording(small)
+
+
+@pytest.fixture(scope="session")
+def entry(finished: Path) -> Entry:
+    """The calibrated mount, as it is to be entered there."""
+    return entry_of(result_of(finished))
 
 
 @pytest.fixture

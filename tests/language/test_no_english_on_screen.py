@@ -20,7 +20,7 @@ from tools.survey_software import entry_of, georeferenced, in_crs, recording, wr
 
 COMMANDS = [str(info.name) for info in app.registered_commands]
 WORDS = re.compile(r"(?<![-<\w])[a-z]{2,} [a-z]{2,}(?!>)")  # two words of a sentence; <float range> is a kind of value
-DATA = ("undisturbed", "session", "runs/a", "CRS", "EPSG", "Kluster")
+DATA = ("undisturbed", "session", "runs/a", "CRS", "EPSG", "Kluster", "qimera")
 PRODUCTS = (  # programs, their parts and formats: written as their makers do
     "NOAA", "Kluster", "Applanix POS MV", "Vessel Editor", "HYSWEEP", "HSX", "OF2", "IIP", "MB-System", "SPAN", "ROS",
     "URDF", "PDAL", "XML", "CIDCO", "MBES-lib", "SONAR-netCDF4", "XSF", "Platform", "stage", "tf2", "CONVENTIONS.md",
@@ -50,8 +50,14 @@ def test_help(words: list[str]) -> None:
     assert left == []
 
 
-@pytest.mark.parametrize("words", [["rn"], ["run"], ["run", "a", "--jbs"], ["diff", "a", "b", "--tolerance-mm", "x"],
-                                   ["export", "a", "--ins-point", "1"], ["verify"], ["check", "a", "b"]], ids=" ".join)  # fmt: skip
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["rn"], ["run"], ["run", "a", "--jbs"], ["diff", "a", "b", "--tolerance-mm", "x"],
+        ["export", "a", "--ins-point", "1"], ["verify"], ["check", "a", "b"],
+    ],
+    ids=" ".join,
+)  # fmt: skip
 def test_a_wrong_command_line(words: list[str]) -> None:
     assert_chinese(screen(poolcal(*words), 2), "'rn'", "FILE", "FOLDER", "'")
 
