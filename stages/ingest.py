@@ -17,6 +17,7 @@ from pipeline.artefacts.catalogue.points import (
     POOL_FRAME,
     SOUNDINGS,
     TRAJECTORY,
+    UNSOUNDED_PASSES,
 )
 from pipeline.artefacts.schema import RawFiles
 from pipeline.artefacts.streams import EMPTY_STREAM, BatchResult, Chunk, Stream
@@ -37,6 +38,7 @@ from pipeline.readers.file_summaries import (
     thin_sigmas,
 )
 from pipeline.readers.track_tables import passes_table, pool_frame_table
+from pipeline.readers.unsounded_passes import unsounded_passes_table
 
 _OF_A_SOUNDING = ("sound_speed_m_s", "two_way_time_s")
 
@@ -66,6 +68,7 @@ class Outputs:
     trajectory: Annotated[pd.DataFrame, TRAJECTORY]
     ins_sigmas: Annotated[pd.DataFrame, INS_SIGMAS]
     passes: Annotated[pd.DataFrame, PASSES]
+    unsounded_passes: Annotated[pd.DataFrame, UNSOUNDED_PASSES]
     pool_frame: Annotated[pd.DataFrame, POOL_FRAME]
     files: Annotated[pd.DataFrame, FILES]
     gaps: Annotated[pd.DataFrame, GAPS]
@@ -156,11 +159,14 @@ def combine(prepared: None, partials: dict[str, list[tuple[str, ChunkSummary]]],
     calibrated = "mbes" if "mbes" in epochs else "laser"  # no pass extends beyond the epochs of this sensor
     pool_frame, frame = pool_frame_table(trajectory, config.target_place)
     max_gap_ns = round(config.ingest.max_gap_s * NS)
+    limits = (max_gap_ns, config.ingest.reversal_m)
+    passes = passes_table(trajectory, frame, epochs[calibrated], *limits)
     sigmas, outside = _sigmas(partials["ins"], int(ins_t[0]), int(ins_t[-1]))
     return Outputs(
         trajectory=trajectory,
         ins_sigmas=sigmas,
-        passes=passes_table(trajectory, frame, epochs[calibrated], max_gap_ns, config.ingest.reversal_m),
+        passes=passes,
+        unsounded_passes=unsounded_passes_table(trajectory, frame, epochs["laser"], passes, *limits),
         pool_frame=pool_frame,
         files=files_table(partials),
         gaps=gaps_table({"ins": ins_t, calibrated: epochs[calibrated]}, max_gap_ns),

@@ -6,7 +6,7 @@ from typing import Annotated
 import pandas as pd
 
 from pipeline.artefacts.catalogue.patent import CORRECTIONS
-from pipeline.artefacts.catalogue.points import FILES, INS_SIGMAS, PASSES
+from pipeline.artefacts.catalogue.points import FILES, INS_SIGMAS, PASSES, UNSOUNDED_PASSES
 from pipeline.artefacts.catalogue.results import (
     ADJUST_SUMMARY,
     CELLS,
@@ -30,6 +30,7 @@ class Evidence:
 
     files: Annotated[pd.DataFrame, FILES]
     passes: Annotated[pd.DataFrame, PASSES]
+    unsounded_passes: Annotated[pd.DataFrame, UNSOUNDED_PASSES]
     ins_sigmas: Annotated[pd.DataFrame, INS_SIGMAS]
     faces: Annotated[pd.DataFrame, FACES]
     planes: Annotated[pd.DataFrame, PLANES]

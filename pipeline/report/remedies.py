@@ -200,8 +200,9 @@ REMEDIES: dict[Code, Remedy] = {
         "If it was surveyed better than that, check laser.mount and the datum of target.origin.",
     ),
     Code.PASS_WITHOUT_SOUNDINGS: Remedy(
-        "In a pass the laser saw the target and the sonar has no soundings on it.",
-        "See that the sonar was recording and that its gate was right.",
+        "In a pass the laser saw the target and the sonar has no soundings on it, or none at all: a file of the sonar "
+        "may be missing.",
+        "See that all of the sonar's files are in the session, that it was recording and that its gate was right.",
     ),
     Code.PASS_WITHOUT_LASER: Remedy(
         "In a pass the sonar saw the target and the laser has no points on it.",

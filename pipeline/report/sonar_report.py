@@ -17,7 +17,7 @@ from pipeline.report.evidence import Evidence
 from pipeline.report.method_blocks import Block, adjustment_block, mounted_of, patent_blocks
 from pipeline.report.plane_agreement import lifted_moments_by_family, plane_agreement_table
 from pipeline.report.sensor_report import SensorReport
-from pipeline.report.warnings import passes_with_one_sensor
+from pipeline.report.warnings import passes_with_one_sensor, passes_without_files
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,7 +67,7 @@ def sonar_report(settings: SonarSettings, evidence: Evidence, passes: Sequence[M
         result_keys={"mbes": methods[method], "methods": methods},
         data_keys={"ranges": _range_note(mbes)} | _cast_block(mbes),
         instruments={"mbes": mbes},
-        pass_warnings=tuple(passes_with_one_sensor(passes)),
+        pass_warnings=(*passes_without_files(evidence.unsounded_passes), *passes_with_one_sensor(passes)),
         cast_warnings=tuple(cast_warnings(mbes, evidence.files, methods["adjustment"]["correction"])),
         closing=_closing(evidence, coarse, methods),
     )

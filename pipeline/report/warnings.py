@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline.console import plural
+from pipeline.gps_time import utc_text
 from pipeline.maths.mount_parameters import MOUNT_WORDS, PARAMETERS
 from pipeline.report.reason_codes import ReasonCode, Statement
 
@@ -95,6 +96,22 @@ def target_off_origin(target: Mapping[str, Any]) -> list[Statement]:
         f"{tilts[0]:+.2f}° and {tilts[1]:+.2f}°: if it was set up and surveyed better than this, check laser.mount"
     )
     return [Statement(ReasonCode.TARGET_OFF_ORIGIN, words)]
+
+
+def passes_without_files(unsounded: pd.DataFrame) -> list[Statement]:
+    """Return a warning if the boat passed the target while the laser ran and the sonar did not (``unsounded``: table).
+
+    No pass of the run shows this, because passes are made of soundings.
+    """
+    if unsounded.empty:
+        return []
+    rows = zip(unsounded["start_ns"], unsounded["distance_m"], strict=True)
+    times = ", ".join(f"{utc_text(int(t_ns))} ({distance_m:.1f} m)" for t_ns, distance_m in rows)
+    words = (
+        "the boat also passed the target with the laser running and without any soundings, which the result lacks: "
+        f"{times}; is a file of the sonar missing?"
+    )
+    return [Statement(ReasonCode.PASS_WITHOUT_SOUNDINGS, words)]
 
 
 def passes_with_one_sensor(passes: Sequence[Mapping[str, Any]]) -> Iterator[Statement]:

@@ -20,7 +20,13 @@ from pipeline.report.noise_warnings import correlated_beams, sigmas_too_small, u
 from pipeline.report.reason_codes import ReasonCode, Statement
 from pipeline.report.suspected_causes import errors_allowed_for
 from pipeline.report.verdict import rejections
-from pipeline.report.warnings import geometry_gaps, passes_with_one_sensor, target_off_origin, unexpected_noise
+from pipeline.report.warnings import (
+    geometry_gaps,
+    passes_with_one_sensor,
+    passes_without_files,
+    target_off_origin,
+    unexpected_noise,
+)
 from tests.support.evidence import (
     ADJUSTED,
     FIGURES,
@@ -176,6 +182,12 @@ OTHERS: list[tuple[Callable[[], Iterable[Statement]], ReasonCode, str]] = [
         lambda: passes_with_one_sensor([{"pass": k, "laser_points": 9, "soundings": 0} for k in (2, 5)]),
         ReasonCode.PASS_WITHOUT_SOUNDINGS,
         "passes 2, 5: the laser saw the target, and there are no soundings on it; was it recording?",
+    ),
+    (
+        lambda: passes_without_files(pd.DataFrame({"start_ns": [1_462_608_018 * 10**9], "distance_m": [4.96]})),
+        ReasonCode.PASS_WITHOUT_SOUNDINGS,
+        "the boat also passed the target with the laser running and without any soundings, which the result lacks: "
+        "2026-05-12T08:00:00Z (5.0 m); is a file of the sonar missing?",
     ),
     (
         lambda: passes_with_one_sensor([{"pass": 6, "laser_points": 0, "soundings": 9}]),

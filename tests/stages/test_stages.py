@@ -72,6 +72,23 @@ def test_passes_and_quality_are_recorded(noisy_found):
     assert rates["mbes"] == pytest.approx(10, rel=1e-2)
 
 
+def test_a_pass_that_only_the_laser_recorded_is_kept_in_mind(quiet):
+    """All of a pass's soundings away, or all but a few; a pass of which half is there has its row in ``passes``."""
+    passes, t = calibrated(quiet, "ingest")["ingest/passes"], quiet.mbes["t_ns"]
+    for number, lost_share, expected in ((0, 1.0, 1), (1, 1.0, 1), (3, 1.0, 1), (1, 0.5, 0)):
+        start, end = passes.loc[number, ["start_ns", "end_ns"]]
+        kept = (t < start) | (t > start + lost_share * (end - start))
+        found = calibrated(quiet, "ingest", raw={"mbes": {k: v[kept] for k, v in quiet.mbes.items()}})
+        unsounded = found["ingest/unsounded_passes"]
+        assert len(unsounded) == expected
+        assert ((unsounded["start_ns"] + unsounded["end_ns"]) // 2).between(start, end).all()
+        np.testing.assert_allclose(unsounded["distance_m"], [passes.loc[number, "distance_m"]] * expected, atol=0.1)
+
+
+def test_in_a_whole_session_no_pass_lacks_soundings(quiet_found):
+    assert quiet_found["ingest/unsounded_passes"].empty
+
+
 @pytest.mark.parametrize(
     ("sensor", "shift_s", "words"),
     [

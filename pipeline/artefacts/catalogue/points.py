@@ -66,6 +66,14 @@ PASSES = Artefact(
         Column("distance_m", F64, "m", "median distance of the INS from the wall's plane while the wall is abeam"),
     ),
 )
+UNSOUNDED_PASSES = Artefact(
+    "ingest", "unsounded_passes", "table", "times in which the boat passed the target, the laser ran and the sonar not",
+    (
+        Column("start_ns", I64, "ns", "the target comes abeam, GPS"),
+        Column("end_ns", I64, "ns", "last time abeam, GPS"),
+        Column("distance_m", F64, "m", "median distance of the INS from the wall's plane in this time"),
+    ),
+)
 FILES = Artefact(
     "ingest", "files", "table", "quality of each raw file",
     (
