@@ -1,5 +1,6 @@
 """Errors that may explain why a sensor's points miss the target: of its clock, of a unit, of a sign in its mount."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -77,6 +78,15 @@ def hypotheses(track: InsTrack, sample: PointSample, closest: ClosestSurface) ->
         reversed_mount = sample.mount.model_copy(update={key: -value})
         words = f"with {sample.sensor}.mount.{key} = {-value:g} in place of {value:g}: reverse its sign"
         tried.append(Hypothesis(score(TrialPlacement(mount=reversed_mount)), words=words))
+    angles = {key: getattr(sample.mount, key) for key in SIGNS[:3]}
+    if 0 < max(map(abs, angles.values())) <= math.pi:
+        degrees = {key: math.degrees(value) for key, value in angles.items()}
+        in_degrees = sample.mount.model_copy(update=degrees)
+        words = (
+            f"if the angles of {sample.sensor}.mount are in radians: write degrees, such as "
+            f"{SIGNS[0]}: {degrees[SIGNS[0]]:.4g}"
+        )
+        tried.append(Hypothesis(score(TrialPlacement(mount=in_degrees)), words=words))
     for key in ("x_m", "y_m", "z_m"):
         value = getattr(sample.mount, key)
         if abs(value) > FAR_ARM_M:

@@ -1,6 +1,7 @@
 """Strict reading of a YAML file. Every failure is an error of one line that names the file."""
 
 import hashlib
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -128,7 +129,7 @@ def _loaded(text: str, path: Path, load: Callable[[_StrictLoader], Any]) -> Any:
         return load(_StrictLoader(text))
     except (yaml.YAMLError, ValueError) as error:
         words = " ".join(str(error).replace('in "<unicode string>", ', "at ").split())
-        raise ConfigError(f"{path}: not valid YAML: {words}; correct the file") from error
+        raise ConfigError(f"{path}: not valid YAML: {words}; {_remedy(text, error)}") from error
     except RecursionError as error:
         raise ConfigError(f"{path}: not valid YAML: it is nested too deeply; correct the file") from error
     except Exception as error:  # the library may raise any exception for a value that it cannot read
@@ -136,3 +137,14 @@ def _loaded(text: str, path: Path, load: Callable[[_StrictLoader], Any]) -> Any:
             f"{path}: not valid YAML: a value is not of the type that its tag or form announces "
             f"({type(error).__name__}: {error}); put it in quotes, and take tags such as !!float out"
         ) from error
+
+
+def _remedy(text: str, error: Exception) -> str:
+    """Return what to do about a text that is no YAML: the commonest slip is no blank behind a colon."""
+    mark = getattr(error, "problem_mark", None)
+    lines = text.splitlines()
+    for number in range(mark.line, max(mark.line - 2, -1), -1) if mark is not None else ():
+        slip = re.match(r"[\s{-]*(\w+):[^\s/\\]", lines[number]) if number < len(lines) else None
+        if slip:
+            return f"write a blank behind the colon of {slip[1]} in line {number + 1}"
+    return "correct the file"

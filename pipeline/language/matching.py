@@ -108,8 +108,8 @@ class Catalogue:
         bracket = BRACKET.fullmatch(core)
         if bracket is not None and not bracket[3] and (before := self._whole(bracket[1])) is not None:
             return _joined(before, "", self._bracket(bracket[2]))
-        known = [(self._whole(core[:place]), place) for place in reversed(_outside_brackets(core, "; "))]
-        if whole := [(found, place) for found, place in known if found is not None]:
+        tried = ((self._whole(core[:place]), place) for place in reversed(_outside_brackets(core, "; ")))
+        if whole := [(found, place) for found, place in tried if found is not None]:
             found, place = min(whole, key=lambda one: one[0].left)  # of equal ones the longest
             return _joined(found, BREAKS["; "], self._found(core[place + 2 :]))
         marks = sorted(("; ", ": "), key=lambda mark: (_outside_brackets(core, mark) or [len(core)])[0])

@@ -1,5 +1,6 @@
 """poolcal check on a target that is not where the config says: its height, its sides, its azimuth."""
 
+import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -149,6 +150,15 @@ def test_z_of_one_mount_is_told_from_the_height(blocks: Looked) -> None:
 def test_a_lever_arm_in_centimetres(blocks: Looked) -> None:
     (found,) = [one for one in blocks.missing(mbes={"x_m": 38.0}) if "mbes" in one.words]
     assert "mbes.mount.x_m = 0.38 in place of 38: write metres" in found.words
+
+
+def test_angles_in_radians(blocks: Looked) -> None:
+    mount = blocks.session.mbes.mount
+    keys = ("roll_deg", "pitch_deg", "yaw_deg")
+    (found,) = blocks.missing(mbes={key: math.radians(getattr(mount, key)) for key in keys})
+    assert f"the angles of mbes.mount are in radians: write degrees, such as roll_deg: {mount.roll_deg:g}" in found.words
+    (found,) = blocks.missing(mbes={"roll_deg": math.radians(mount.roll_deg)})  # one alone is no habit
+    assert "radians" not in found.words
 
 
 @pytest.mark.parametrize(("turn", "said"), [(90, "never passes"), (-90, "never passes"), (40, "does not sail along")])

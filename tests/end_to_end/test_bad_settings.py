@@ -54,6 +54,7 @@ YAML: dict[str, tuple[Spoil, tuple[str, ...]]] = {
     "binary": (_write("pool.yaml", bytes(range(256)) * 9), ("pool.yaml", "UTF-8")),
     "control characters": (_write("pool.yaml", bytes(99)), ("pool.yaml", "not valid YAML")),
     "no YAML": (_write("pool.yaml", b"target: {a: 1\n"), ("pool.yaml", "not valid YAML")),
+    "no blank": (_add("pool.yaml", "verdict:\n  max_sigma_m:1\n  held: []\n"), ("colon of max_sigma_m in line",)),
     "deep YAML": (_write("pool.yaml", b"[" * 9999), ("pool.yaml", "not valid YAML")),
     "huge file": (_write("pool.yaml", b"# much\n" * 200_000), ("pool.yaml", "1400000 bytes", "name the YAML")),
     "object": (_write("pool.yaml", b"!!python/object/apply:os.getcwd []\n"), ("pool.yaml", "not valid YAML")),
