@@ -29,6 +29,7 @@ BRACKET = re.compile(r"([^()]*) \(([^()]*)\)(.*)", re.DOTALL)
 NUMBER = re.compile(  # words before a number, or behind it
     r"([A-Za-z][A-Za-z, ]*?|[-+±]?\d[^A-Za-z]*) ((?<=[a-z] )[-+±]?\d.*|(?<![a-z] )[A-Za-z].*)", re.DOTALL
 )
+ITEM = re.compile(r"\d+\. ")  # of a list, its number before it
 SPEAKER = "poolcal: "
 FULL_STOP = {".": "。", ":": "：", ";": "；", "?": "？", "!": "！"}
 MOST_LETTERS = 5000  # of a text that is taken apart: longer ones are data
@@ -85,6 +86,8 @@ class Catalogue:
     def _sentence(self, core: str) -> Found:
         if core.startswith(SPEAKER) and core not in self._exact:  # of every complaint: it is no part of the sentence
             return _joined(Found(SPEAKER[:-2], 0), BREAKS[": "], self._found(core.removeprefix(SPEAKER)))
+        if number := ITEM.match(core):
+            return _joined(Found(number[0], 0), "", self._found(core[number.end() :]))
         found = self._whole(core)
         stop = FULL_STOP.get(core[-1], "")
         if stop and len(core) > 1 and core not in self._exact and (found is None or found.text[-1] != stop):

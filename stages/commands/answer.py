@@ -37,7 +37,7 @@ def say_where(run: Path) -> None:
     if page.is_file():
         say(f"Report: {page}", sys.stdout)
     if any(run.glob("*/*.rrd")):
-        say(f"Recordings: {_command('view', run)}", sys.stdout)
+        say(f"See the recordings: {_command('view', run)}", sys.stdout)
 
 
 def say_next(run: Path) -> None:

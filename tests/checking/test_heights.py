@@ -156,7 +156,7 @@ def test_angles_in_radians(blocks: Looked) -> None:
     mount = blocks.session.mbes.mount
     keys = ("roll_deg", "pitch_deg", "yaw_deg")
     (found,) = blocks.missing(mbes={key: math.radians(getattr(mount, key)) for key in keys})
-    assert f"the angles of mbes.mount are in radians: write degrees, such as roll_deg: {mount.roll_deg:g}" in found.words
+    assert f"angles of mbes.mount are in radians: write degrees, such as roll_deg: {mount.roll_deg:g}" in found.words
     (found,) = blocks.missing(mbes={"roll_deg": math.radians(mount.roll_deg)})  # one alone is no habit
     assert "radians" not in found.words
 

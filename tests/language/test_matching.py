@@ -31,6 +31,8 @@ def catalogue() -> Catalogue:
         ("the clock is 5 ms late.", "时钟晚 5 ms。"),
         ("accepted; the clock is 5 ms late", "合格；时钟晚 5 ms"),
         ("no soundings, no roll", "没有水深点，没有横摇"),
+        ("1. the clock is 5 ms late", "1. 时钟晚 5 ms"),
+        ("12. accepted: the clock is 5 ms late", "12. 合格：时钟晚 5 ms"),
         ("a file/名.xtf", "a file/名.xtf"),
         ("-48.8 °", "-48.8 °"),
         ("", ""),
