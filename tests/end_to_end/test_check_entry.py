@@ -48,7 +48,7 @@ def test_a_right_entry_passes(
 @pytest.mark.parametrize(
     ("changed", "code"),
     [
-        ({"angles_deg": (1, 1, -1)}, "sign_yaw"),
+        pytest.param({"angles_deg": (1, 1, -1)}, "sign_yaw", marks=pytest.mark.thorough),
         pytest.param({"angles_deg": (-1, 1, 1)}, "sign_roll", marks=pytest.mark.thorough),
         ({"order": "rph"}, "order_roll_pitch_yaw"),
         pytest.param({"lever_arm_m": (1, 1, -1)}, "sign_z", marks=pytest.mark.thorough),
@@ -81,7 +81,9 @@ def test_a_mistake_is_named(
             {"shift_m": (0.31, -0.12, 0.0)}, "shift", "all soundings are shifted by +0.310 m east, -0.120 m north",
             marks=pytest.mark.thorough,
         ),
-        ({"delay_s": 0.5}, "delay", "the software's poses are +0.5000 s late"),
+        pytest.param(
+            {"delay_s": 0.5}, "delay", "the software's poses are +0.5000 s late", marks=pytest.mark.thorough
+        ),
     ],
 )
 def test_a_right_entry_with_something_else_wrong(
