@@ -8,6 +8,8 @@ import pandas as pd
 from pipeline.artefacts.columns import COUNTS
 from pipeline.artefacts.count_codes import code_of
 
+SENSOR_OF = {"laser_points": "laser", "laser_pool": "laser", "soundings": "mbes", "soundings_pool": "mbes"}
+
 
 def counts_table(partials: Mapping[str, Sequence[tuple[str, Mapping[str, int]]]]) -> pd.DataFrame:
     """Return the table ``counts``: the counts of all chunks, summed by source and reason.
@@ -34,6 +36,15 @@ def counts_table(partials: Mapping[str, Sequence[tuple[str, Mapping[str, int]]]]
             for reason, number in sorted(total.items())
         ]
     return pd.DataFrame(rows, columns=[column.name for column in COUNTS])
+
+
+def sensor_of(source: str) -> str:
+    """Return the sensor whose points a source of the counts holds, for people to read.
+
+    >>> sensor_of("soundings_pool"), sensor_of("ins")
+    ('mbes', 'ins')
+    """
+    return SENSOR_OF.get(source, source)
 
 
 def used(counts: pd.DataFrame, source: str) -> float:

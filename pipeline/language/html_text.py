@@ -12,6 +12,7 @@ from pipeline.language.chosen import ENGLISH, language, translated
 
 LEFT = ("style", "script", "code", "pre", "svg", "title")  # elements whose texts are not translated
 SPOKEN = ("alt", "title", "aria-label")  # attributes that are read out or shown
+MARKS = str.maketrans({".": "。", ";": "；", ",": "，", ":": "：", "(": "（", ")": "）", " ": ""})  # between elements
 VOID = ("area", "base", "br", "col", "embed", "hr", "img", "input", "link", "meta", "source", "track", "wbr")
 
 
@@ -26,9 +27,13 @@ def translated_page(page: str) -> str:
     return "".join(reader.parts).replace('<html lang="en">', f'<html lang="{language()}">', 1)
 
 
-def _on_one_line(text: str) -> str:
-    """Return a text as a browser shows it: every run of blanks and ends of lines is one blank."""
-    return re.sub(r"[ \t\r\n]+", " ", unescape(text))
+def _translated(text: str) -> str:
+    """Return the text between two tags in the language of this process: words, or marks alone.
+
+    A browser shows every run of blanks and ends of lines as one blank.
+    """
+    line = re.sub(r"[ \t\r\n]+", " ", unescape(text))
+    return line.translate(MARKS) if re.fullmatch(r" ?[.;,:()][.;,:() ]*", line) else translated(line)
 
 
 class _Page(HTMLParser):
@@ -43,7 +48,7 @@ class _Page(HTMLParser):
     def end_text(self) -> None:
         """Write the text that has been read."""
         if self.text:
-            self.parts.append(self.text if self.left else escape(translated(_on_one_line(self.text)), quote=False))
+            self.parts.append(self.text if self.left else escape(_translated(self.text), quote=False))
         self.text = ""
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:

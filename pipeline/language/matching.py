@@ -103,6 +103,8 @@ class Catalogue:
                     return _joined(found, "", self._found(second))
                 return _joined(self._found(first), BREAKS[mark], self._found(second))
         apart = self._taken_apart(core)
+        if stop and re.search(r"[\u4e00-\u9fff）].$", apart.text):
+            apart = Found(apart.text[:-1] + stop, apart.left)
         left, words = apart.left, len(PLAIN.findall(core))
         return _english(core) if left > 1 and 3 * left > words else apart  # half a sentence is worse than none
 

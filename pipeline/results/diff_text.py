@@ -4,6 +4,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from pipeline.artefacts.counts import sensor_of
 from pipeline.console import plural
 from pipeline.language.chosen import translated
 from pipeline.results.answer_text import answer_lines
@@ -34,7 +35,7 @@ def difference_text(difference: Mapping[str, Any]) -> str:
     if difference["counts"]:
         lines += ["", "counts:"]
         lines += [
-            f"  {row['stage']}, {row['source']}, {row['reason']}: {row['a']:,} -> {row['b']:,}"
+            f"  {row['stage']}, {sensor_of(row['source'])}, {row['reason']}: {row['a']:,} -> {row['b']:,}"
             for row in difference["counts"]
         ]
     if difference["planes"]:

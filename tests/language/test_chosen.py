@@ -66,7 +66,8 @@ def test_a_page_keeps_its_markup_and_its_data(monkeypatch: pytest.MonkeyPatch) -
     page = (
         '<!DOCTYPE html><html lang="en"><head><style>p {x: "rejected"}</style></head><body><p>rejected</p>'
         '<p translate="no">rejected <b>rejected</b></p><code>rejected</code><img alt="rejected" src="a">'
-        "<p>&lt;b&gt; a_<wbr>b &amp; &#8211;</p></body></html>"
+        "<p>&lt;b&gt; a_<wbr>b &amp; &#8211;</p>"
+        "<p><b>rejected</b> (<i>rejected</i>, 1.5); <i>rejected</i>.</p></body></html>"
     )
     turned = translated_page(page)
     assert f"<p>{rejected}</p>" in turned
@@ -74,6 +75,7 @@ def test_a_page_keeps_its_markup_and_its_data(monkeypatch: pytest.MonkeyPatch) -
     assert f'<img alt="{rejected}" src="a">' in turned
     assert 'p {x: "rejected"}' in turned
     assert "<p>&lt;b&gt; a_b &amp; –</p>" in turned
+    assert f"<b>{rejected}</b>（<i>{rejected}</i>, 1.5); <i>{rejected}</i>。</p>" in turned
     assert '<html lang="zh">' in turned
 
 

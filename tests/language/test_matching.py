@@ -30,6 +30,8 @@ def catalogue() -> Catalogue:
         ("The clock is 5 ms late", "时钟晚 5 ms"),
         ("the clock is 5 ms late.", "时钟晚 5 ms。"),
         ("accepted; the clock is 5 ms late", "合格；时钟晚 5 ms"),
+        ("accepted, roll.", "合格，横摇。"),
+        ("accepted, 1.5.", "合格，1.5."),
         ("no soundings, no roll", "没有水深点，没有横摇"),
         ("1. the clock is 5 ms late", "1. 时钟晚 5 ms"),
         ("12. accepted: the clock is 5 ms late", "12. 合格：时钟晚 5 ms"),

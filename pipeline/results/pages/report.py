@@ -24,6 +24,7 @@ from pipeline.artefacts.catalogue.results import (
     FREED,
     GROUPS,
 )
+from pipeline.artefacts.counts import sensor_of
 from pipeline.atomic_files import write_text
 from pipeline.config.changes import changed_settings
 from pipeline.config.target import Letters
@@ -171,7 +172,11 @@ def _data_values(
 ) -> Row:
     """Return the template's values about passes, files, counts, settings and provenance."""
     gaps = tables.table(GAPS).sort_values("duration_s", ascending=False)
-    counts = [row | {"stage": stage} for stage, of_stage in manifests.items() for row in of_stage.counts]
+    counts = [
+        row | {"stage": stage, "sensor": sensor_of(row["source"])}
+        for stage, of_stage in manifests.items()
+        for row in of_stage.counts
+    ]
     return {
         "tracks": tables.table(PASSES).to_dict("records"),
         "files": tables.table(FILES).to_dict("records"),
