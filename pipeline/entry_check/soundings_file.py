@@ -144,7 +144,7 @@ def file_side(path: Path, crs: str | None, side: RunSide) -> FileSide:
         raise RawDataError(f"{path}: holds no sounding; export x, y, z of each sounding")
     points, row = near.points()
     if len(points) < LEAST_POINTS:
-        raise RawDataError(_elsewhere(path, placing, first, len(points), side))
+        raise RawDataError(_elsewhere(path, placing, first, (len(points), rows), side))
     step_m = max(source.step_m, _step_m(first, placing))
     if step_m > COARSEST_M * 1.01:
         raise RawDataError(f"{path}: its coordinates are whole steps of {step_m:.2g} m; export 3 decimals of a metre")
@@ -176,15 +176,21 @@ def _nearest_m(placing: Placing, coordinates: Array, side: RunSide) -> float:
     return float(np.min(np.linalg.norm(level, axis=1), initial=np.inf, where=np.isfinite(level).all(axis=1)))
 
 
-def _elsewhere(path: Path, placing: Placing, coordinates: Array, count: int, side: RunSide) -> str:
-    """Return the message that the points lie elsewhere, and in which CRS they would lie at the target."""
+def _elsewhere(path: Path, placing: Placing, coordinates: Array, counts: tuple[int, int], side: RunSide) -> str:
+    """Return the message that the points lie elsewhere, and in which CRS they would lie at the target.
+
+    ``coordinates`` are the file's first; ``counts`` are the numbers of those near the track and of all.
+    """
+    count, rows = counts
     away = _nearest_m(placing, coordinates, side)
     if away < side.soundings.reach_m + MARGIN_M:
         return (
             f"{path}: too few soundings lie near the run's track ({count}; {LEAST_POINTS} are needed); "
             "export whole passes"
         )
-    says = f"{path}: {count or 'no'} soundings lie near the run's track in {placing.name} ({placing.title})"
+    says = (
+        f"{path}: in {placing.name} ({placing.title}) {count:,} of {rows:,} soundings lie near the run's track"
+    )
     found = hints(coordinates, side, 500.0)
     if found:
         names = [f"{one.name} ({one.title}{', x and y exchanged' if one.swapped else ''})" for one in found]
