@@ -44,10 +44,9 @@ def mounting_of(run: FinishedRun, sensor: Calibrated | None, although_rejected: 
     with as_written(run.path):
         rejected = None if run.result["verdict"] == "accepted" else tuple(map(str, run.result["reasons"]))
         if rejected is not None and not although_rejected:
-            raise ConfigError(
-                f"{run.path}: was rejected, and must not be used ({'; '.join(rejected)}); to look at its values in a "
-                "program's form, add --although-rejected"
-            )
+            has_values = run.result[calibrated]["mount"] is not None
+            look = "; to look at its values in a program's form, add --although-rejected" if has_values else ""
+            raise ConfigError(f"{run.path}: was rejected, and must not be used ({'; '.join(rejected)}){look}")
         passes = run.result["passes"]
         origin = Origin(
             session=one_line(session.name),

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import laspy
@@ -11,7 +12,11 @@ import pytest
 import yaml
 
 from pipeline.config.load import load_session
+from pipeline.errors import ConfigError
 from pipeline.exports.registry import TARGETS
+from pipeline.exports.source import mounting_of
+from pipeline.results.finished_run import FinishedRun
+from stages import ORDER
 from tests.support.places import Place, Told, edit, poolcal
 from tests.support.programs import READERS
 
@@ -112,6 +117,21 @@ def test_a_rejected_run_only_when_told(undisturbed: tuple[Path, Told], place: Pl
     assert poolcal("export", place.run, "--to", "json", "--although-rejected", "--out", sheet).status == 0
     told = poolcal("mount", sheet, "--from", "json", "--session", place.session, "--no-write")
     assert "of a rejected run" in told.out
+
+
+@pytest.mark.parametrize("mount", [None, {}])
+def test_values_that_are_not_there_are_not_offered(
+    undisturbed: tuple[Path, Told], mount: dict[str, float] | None
+) -> None:
+    run = FinishedRun.read(undisturbed[0], ORDER)
+    block = {**run.result["mbes"], "mount": mount, "no_result": "out of sight"}
+    rejected = replace(run, result={**run.result, "verdict": "rejected", "reasons": ["out of sight"], "mbes": block})
+    with pytest.raises(ConfigError, match="must not be used") as told:
+        mounting_of(rejected, None, although_rejected=False)
+    assert ("add --although-rejected" in str(told.value)) == (mount is not None)
+    if mount is None:
+        with pytest.raises(ConfigError, match="nothing can be exported"):
+            mounting_of(rejected, None, although_rejected=True)
 
 
 def test_points_have_the_residuals_of_the_adjustment(undisturbed: tuple[Path, Told], tmp_path: Path) -> None:

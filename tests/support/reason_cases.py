@@ -54,7 +54,7 @@ REASONS: list[tuple[dict[str, Any], ReasonCode, str]] = [  # evidence, code, wor
         ReasonCode.NOISE_CUT_BY_GATE,
         "soundings on P2 scatter by 45 mm, and those more than 80 mm off its faces are not used",
     ),
-    ({"count": -371}, ReasonCode.TOO_FEW_SOUNDINGS, "only 29 soundings lie on P2: too few to trust; sail so that"),
+    ({"count": -371}, ReasonCode.TOO_FEW_SOUNDINGS, "too few soundings lie on P2 to trust (29): sail so that the"),
     (
         {"freed": {"unknown": "rotation_z", "value": -0.0523, "sigma": 2e-3, "expected": 9e-3}},
         ReasonCode.COARSE_MOUNT_CONTRADICTED,
