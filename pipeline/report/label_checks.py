@@ -19,8 +19,8 @@ def too_few_soundings(cells: pd.DataFrame) -> list[Statement]:
     return [
         Statement(
             ReasonCode.TOO_FEW_SOUNDINGS,
-            f"too few soundings lie on {family} to trust ({number}): sail so that the fan covers it (poolcal check tells "
-            "why so few hit it)",
+            f"too few soundings lie on {family} to trust ({number}): sail so that the fan covers it (poolcal check "
+            "tells why so few hit it)",
         )
         for family, number in count.items()
         if number < MIN_SOUNDINGS
