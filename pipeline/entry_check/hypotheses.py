@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.entry_check.run_soundings import EntrySource
-from pipeline.maths.geometry.rotations import mount_from_rotation, rotation_x, rotation_y, rotation_z
+from pipeline.maths.geometry.rotations import exp_so3, mount_from_rotation, rotation_x, rotation_y, rotation_z
 from pipeline.mount import Mounted
 
 Array = NDArray[np.float64]
 ANGLES, AXES = ("roll", "pitch", "yaw"), ("x", "y", "z")
 RIGHT = "right"
 FOOT_M = 0.3048
+NEAR_RAD, NEAR_M = np.radians(0.025), 0.01  # 4 mm of a sounding at 10 m; about what a search by places bridges
 
 
 @dataclass(frozen=True)
@@ -157,9 +158,21 @@ def _axes_and_signs(t: Array) -> Iterator[Entered]:
             yield Entered(key, ", and ".join(words), mistakes, np.array(signs) * t[list(axes)])
 
 
+def _near(total: Mounted) -> Iterator[Mounted]:
+    """Yield mounts that are a little off the right one in one parameter: more than a search by places would bridge."""
+    for sign, step, axis in product((1.0, -1.0), (1.0, 2.0), np.eye(3)):
+        R = exp_so3(sign * step * NEAR_RAD * axis) @ total.R_body_from_sensor
+        yield Mounted(R, total.lever_arm_body_m)
+        yield Mounted(total.R_body_from_sensor, total.lever_arm_body_m + sign * step * NEAR_M * axis)
+
+
 def starts(source: EntrySource) -> list[Mounted]:
-    """Return mounts from which the search for the file's soundings begins: those of either part alone first."""
+    """Return mounts from which the search for the file's soundings begins: the right one, others near it, mistakes.
+
+    Of the mistakes those of either part alone come first.
+    """
     angles, arms = list(rotations(source)), list(lever_arms(source))
     joint = [(a, b) for a, b in product(angles, arms) if RIGHT in (a.key, b.key) or a.key == b.key]
     rest = [(a, b) for a, b in product(angles, arms) if a.key != b.key and a.mistakes == b.mistakes == 1]
-    return [Mounted(a.value, b.value) for a, b in [*joint, *rest]]
+    first, *others = (Mounted(a.value, b.value) for a, b in [*joint, *rest])
+    return [first, *_near(first), *others]

@@ -27,8 +27,9 @@ TRIED_GATE_M = 0.008  # a start is exact, but for rounded settings
 BEST_STARTS = 6
 PROBE_M = np.array([[0.31, 0.0, 0.0], [0.0, 0.31, 0.0], [0.0, 0.0, 0.31], [-0.23, 0.19, 0.0]])
 LEAST_PAIRS = 60
-LEAST_SHARE, ABOVE_CHANCE = 0.01, 8.0  # of the run's soundings found again, and by what chance would find;
-MOST, MOST_ABOVE_CHANCE = 0.4, 2.0  # or so many, where a file with rounded coordinates is met by chance often
+# Share of the run's soundings that must be found again, and how many times what chance finds: the more are found, the
+# less they need to be above chance, which finds many in a file that is dense or rounded.
+CLEAR = ((0.01, 8.0), (0.1, 4.0), (0.4, 2.0))
 WELL_ORDERED = 1000  # soundings in pairs that the order proves: no more are needed
 FITTED = 4000  # pairs of each step before the last
 LEVEL_SEARCH_M = 0.01  # horizontal distance of the points whose heights are compared
@@ -176,13 +177,21 @@ def _refined(soundings: RunSoundings, file: FilePoints, fitted: FittedMount, way
     own, other = _nearest(tree, predicted, gate)
     by_chance = max(len(_nearest(tree, predicted + probe, gate)[0]) for probe in PROBE_M) / len(predicted)
     share = len(own) / len(predicted)
-    clear = share >= max(LEAST_SHARE, ABOVE_CHANCE * by_chance) or share >= max(MOST, MOST_ABOVE_CHANCE * by_chance)
-    if len(own) < LEAST_PAIRS or not clear:
+    if len(own) < LEAST_PAIRS or not _is_clear(share, by_chance):
         return None
     return Pairs(
         soundings.rows(own), file.points_m[other], len(own), share, by_chance, way.negated, way.how, fitted.delay_s,
         _evenness(soundings, own),
     )  # fmt: skip
+
+
+def _is_clear(share: float, by_chance: float) -> bool:
+    """Return whether a share of the run's soundings is so far above what chance finds that it is the same soundings.
+
+    >>> _is_clear(0.044, 0.008), _is_clear(0.12, 0.025), _is_clear(0.082, 0.03), _is_clear(0.5, 0.2)
+    (False, True, False, True)
+    """
+    return any(share >= max(least, times * by_chance) for least, times in CLEAR)
 
 
 def _evenness(soundings: RunSoundings, own: Integers) -> float:

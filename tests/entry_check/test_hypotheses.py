@@ -4,6 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from pipeline.entry_check.hypotheses import RIGHT, Entered, lever_arms, rotations, starts
 from tests.support.entered import ANGLES, COARSE, COARSE_LEVER, LASER, LEVER, SOURCE, rotation
@@ -78,3 +79,17 @@ def test_the_right_mount_is_the_first_start() -> None:
     first = starts(SOURCE)[0]
     assert np.allclose(first.R_body_from_sensor, rotation(ANGLES))
     assert np.allclose(first.lever_arm_body_m, LEVER)
+
+
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_value_a_little_off_has_a_start_near_it(axis: int, sign: int) -> None:
+    """Half a step is left: 0.0125° and 5 mm, which the search by places bridges at 10 m (it asks for 8 mm)."""
+    right = starts(SOURCE)[0]
+    for share in (0.0, 0.3, 0.7, 1.0):
+        turn = Rotation.from_rotvec(np.eye(3)[axis] * sign * np.radians(0.0625) * share).as_matrix()
+        shift = np.eye(3)[axis] * sign * 0.025 * share
+        near = starts(SOURCE)[:25]
+        left = [turn @ right.R_body_from_sensor @ one.R_body_from_sensor.T for one in near]
+        assert min(np.degrees(Rotation.from_matrix(R).magnitude()) for R in left) < 0.01255
+        assert min(np.linalg.norm(right.lever_arm_body_m + shift - one.lever_arm_body_m) for one in near) < 0.00501
