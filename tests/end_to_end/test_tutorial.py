@@ -1,8 +1,10 @@
 """The tutorial, command by command: each does what the page says it does. And the demo says what two pages print."""
 
+import os
 import re
 import shlex
 import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -30,7 +32,8 @@ class Reader:
         """The next command; it must begin with these words of poolcal."""
         line = next(self.lines)
         while not line.startswith(".venv/bin/poolcal"):
-            subprocess.run(shlex.split(line), check=True)
+            words = shlex.split(line.replace(".venv/bin/python", sys.executable))
+            subprocess.run(words, check=True, env=os.environ | {"PYTHONPATH": str(ROOT)})
             line = next(self.lines)
         words = shlex.split(line)[1:]
         assert tuple(words[: len(expected)]) == expected
@@ -104,6 +107,9 @@ def test_the_tutorial(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     _ok(poolcal("history", "runs"))
 
     assert "Roll" in _ok(reader.types("export", "runs/tutorial2"))
+    practised = reader.types("check-entry", "runs/tutorial2")
+    assert practised.status == 1
+    assert practised.out.startswith("Not entered rightly: angles: yaw has the opposite sign.")
     if THOROUGH:
         _ok(reader.types("simulate", "runs/dock"))
         assert [*_verdicts(reader.types("run", "runs/dock"))] == ["ACCEPTED"]
