@@ -53,6 +53,6 @@ def _not_found(path: Path, file: FileSide) -> str:
     if file.cell_m is not None:
         return f"{says}: they stand in a grid of {file.cell_m:.2f} m; export single soundings, not a surface"
     return (
-        f"{says}: is it the same session? Export its single soundings, neither gridded nor averaged, 3 decimals, in "
-        "the order of time"
+        f"{says}: is it the same session? Export all its single soundings, not thinned, gridded or averaged, 3 "
+        "decimals, in the order of time"
     )
