@@ -75,7 +75,9 @@ def test_files_counts_settings_and_origin_are_listed(undisturbed: tuple[Path, To
     counts = pd.read_parquet(run / "segment" / "counts.parquet")
     seen = [row[1:] for row in page.table("stage", "points of") if row[0] == "segment"]
     assert sorted((a, b, int(n.replace(",", ""))) for a, b, n in seen) == sorted(
-        row for row in counts[["source", "reason", "count"]].itertuples(index=False, name=None) if row[2]
+        ({"laser_pool": "laser", "soundings_pool": "mbes"}[source], reason, number)
+        for source, reason, number in counts[["source", "reason", "count"]].itertuples(index=False, name=None)
+        if number
     )
     changed = {row[1]: (row[0], *row[2:]) for row in page.table("from", "key", "value")}
     assert changed["target.a"] == ("pool", "8.0", "")
