@@ -3,7 +3,14 @@
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar, cast
 
-from numba import njit
+from numba import njit, types
+
+
+
+def arrays(dtype: Any, dimensions: int, *, written: bool = False) -> Any:
+    """Return the type of contiguous arrays; those that are not written may be read-only, as Arrow's are."""
+    return types.Array(dtype, dimensions, "C", readonly=not written)
+
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
