@@ -87,8 +87,9 @@ echo "setup: installing packages into .venv (some minutes the first time)"
 pip() { .venv/bin/python -m pip --disable-pip-version-check "$@" </dev/null; }
 pip install -q -c constraints.txt setuptools && pip install -q -c constraints.txt --no-build-isolation -e ".${EXTRAS:+[$EXTRAS]}" ||
     fail "packages could not be installed (see above); correct this and run make setup again"
-# stage adjust loads the compiled loops of pipeline/maths/kernels: the first time they are compiled
-.venv/bin/python -c 'import open3d, pyarrow, rerun, stages.cli, stages.adjust' ||
-    fail "the packages do not load (see above)"
+.venv/bin/python -c '
+import open3d, pyarrow, rerun, stages.cli
+from pipeline.maths.kernels.compiled import compile_all
+compile_all()' || fail "the packages do not load, or the loops of pipeline/maths/kernels do not compile (see above)"
 echo "$wanted" >"$stamp"
 echo "setup: ready; the command is .venv/bin/poolcal"

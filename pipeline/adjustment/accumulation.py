@@ -7,11 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
+from pipeline.adjustment.point_sums import summed
 from pipeline.artefacts.streams import Batch, Stream
-from pipeline.maths.adjustment.interval_sums import IntervalSums, Runs, merged
+from pipeline.maths.adjustment.interval_sums import IntervalSums, merged
 from pipeline.maths.adjustment.parameters import State
-from pipeline.maths.adjustment.robust_weights import LEAST_SCALE, histogram, robust_scale
+from pipeline.maths.adjustment.robust_weights import LEAST_SCALE, robust_scale
 from pipeline.maths.adjustment.weighting import Weighting, edge_shares, rescaled, scatter, shrunk_factors
+from pipeline.maths.kernels.interval_group import COUNT, CUT, FIRST_BIN, INFORMATION, REDUCED
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -73,22 +75,18 @@ class Accumulation:
 def _accumulate_batch(
     batch: Batch, model: ObservationModel, sensor: str, values: CurrentValues
 ) -> tuple[IntervalSums, dict[Group, GroupStatistics]]:
-    observations, weighting = model.linearise(sensor, batch, values), values.weighting
-    robust, weight = weighting.weights(observations)
-    normalised = weighting.normalised(observations)
+    of_batch = summed(batch, model, sensor, values)
     groups = {}
-    for surface in Runs.of(observations.surface).starts.tolist():
-        rows = observations.surface == observations.surface[surface]
-        w = robust[rows]
-        cut = int(np.sum(w == 0))
-        groups[sensor, int(observations.surface[surface])] = GroupStatistics(
-            count=len(w),
-            cut=cut,
-            reduced=int(np.sum(w < 1)) - cut,
-            information=float(np.sum(observations.edge_weight[rows], where=w > 0)),
-            histogram=histogram(normalised[rows]),
+    for surface in np.flatnonzero(of_batch.statistics[:, COUNT]).tolist():
+        row = of_batch.statistics[surface]
+        groups[sensor, surface] = GroupStatistics(
+            count=int(row[COUNT]),
+            cut=int(row[CUT]),
+            reduced=int(row[REDUCED]),
+            information=float(row[INFORMATION]),
+            histogram=row[FIRST_BIN:],
         )
-    return observations.sums(weight), groups
+    return of_batch.sums, groups
 
 
 def accumulate(streams: Mapping[str, Stream], model: ObservationModel, values: CurrentValues) -> Accumulation:

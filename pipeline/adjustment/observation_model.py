@@ -175,7 +175,7 @@ class ObservationModel:
         v, mean, sigma, common = np.empty((4, n))  # common: a variance
         features, slopes = np.empty((n_features, n)), np.empty((n_features - 1, n))
         by_pose = pose_design(state.surfaces, np.arange(len(state.surfaces)))
-        errors = self._pose_errors(values.drift, record)
+        errors = self.pose_errors(values.drift, record)
         turns = errors.error[:, 3:].T
         shifts = residual_shift(state, sensor, self.body, errors, n_features)  # (r, s, F)
         linearised = self._linearised_laser if sensor == "laser" else self._linearised_sonar
@@ -225,7 +225,7 @@ class ObservationModel:
         order = np.argsort(surface.astype(np.int16), kind="stable") if ascending else np.lexsort((t_ns, surface))
         return {name: column[order] for name, column in batch.items()}, surface[order]
 
-    def _pose_errors(self, drift: DriftEstimate | None, record: Integers) -> RecordErrors:
+    def pose_errors(self, drift: DriftEstimate | None, record: Integers) -> RecordErrors:
         """Return the drift in the middle of each interval from the batch's first to its last, zero if it is None."""
         first, last = (int(record.min()), int(record.max()) + 1) if len(record) else (0, 0)
         seconds = self.body.seconds[first : last + 1]

@@ -1,18 +1,59 @@
-"""Functions compiled to machine code: once an installation, then loaded from a file."""
+"""Functions compiled to machine code: once an installation, then loaded from a file, at the first call.
 
+The library numba looks at a function's own file alone to see whether its machine code is out of date. But functions of
+other modules, and constants, are part of it. So the name of the code's file holds a digest of them.
+"""
+
+import hashlib
+import importlib
 from collections.abc import Callable, Sequence
+from functools import lru_cache, update_wrapper
+from pathlib import Path
+from threading import Lock
 from typing import Any, TypeVar, cast
 
 from numba import njit, types
 
-
-
-def arrays(dtype: Any, dimensions: int, *, written: bool = False) -> Any:
-    """Return the type of contiguous arrays; those that are not written may be read-only, as Arrow's are."""
-    return types.Array(dtype, dimensions, "C", readonly=not written)
-
-
 Function = TypeVar("Function", bound=Callable[..., Any])
+FOLDER = Path(__file__).parent
+_LOCK = Lock()
+
+
+@lru_cache(maxsize=1)
+def _sources() -> bytes:
+    return b"".join(path.read_bytes() for path in sorted(FOLDER.glob("*.py")))
+
+
+class _Compiled:
+    """A function that is compiled, or its machine code loaded, when it is called first."""
+
+    def __init__(self, function: Callable[..., Any], signature: tuple[Any, ...]) -> None:
+        self._function, self._signature = function, signature
+        self._code: Callable[..., Any] | None = None
+        update_wrapper(self, function)
+
+    def __call__(self, *arguments: Any) -> Any:
+        code = self._code
+        return self.compile()(*arguments) if code is None else code(*arguments)
+
+    def compile(self) -> Callable[..., Any]:
+        """Return the machine code."""
+        with _LOCK:
+            if self._code is None:
+                function = self._function
+                numbers = {name: one for name, one in function.__globals__.items() if isinstance(one, (int, float))}
+                digest = hashlib.sha256(_sources() + repr(sorted(numbers.items())).encode()).hexdigest()[:12]
+                function.__qualname__ = f"{function.__name__}-{digest}"  # part of the name of the code's file
+                try:
+                    self._code = njit(self._signature, nogil=True, cache=True)(function)
+                except RuntimeError:  # no folder for the file may be written
+                    self._code = njit(self._signature, nogil=True)(function)
+        return self._code
+
+
+def named(cls: type[tuple[Any, ...]], *parts: Any) -> Any:
+    """Return numba's type of a named tuple of these parts."""
+    return types.NamedTuple(parts, cls)  # type: ignore[no-untyped-call]
 
 
 def compiled(arguments: Sequence[Any] | None = None) -> Callable[[Function], Function]:
@@ -21,17 +62,23 @@ def compiled(arguments: Sequence[Any] | None = None) -> Callable[[Function], Fun
     Parameters
     ----------
     arguments : sequence of numba types, optional
-        With them the function is compiled when its module is imported, and others are refused. Without them it is part
-        of the compiled functions that call it.
+        With them the function is compiled for these, and others are refused. Without them it is part of the compiled
+        functions that call it.
     """
     signature = tuple(arguments) if arguments is not None else None
 
     def decorator(function: Function) -> Function:
         if signature is None:
             return cast(Function, njit(nogil=True)(function))
-        try:
-            return cast(Function, njit(signature, nogil=True, cache=True)(function))
-        except RuntimeError:  # no folder for the file may be written
-            return cast(Function, njit(signature, nogil=True)(function))
+        return cast(Function, _Compiled(function, signature))
 
     return decorator
+
+
+def compile_all() -> None:
+    """Compile every function of this folder that is not compiled yet, so that no run has to."""
+    for path in sorted(FOLDER.glob("[a-z]*.py")):
+        module = importlib.import_module(f"{__package__}.{path.stem}")
+        for one in vars(module).values():
+            if isinstance(one, _Compiled):
+                one.compile()

@@ -6,22 +6,121 @@ weights and distances, whose weighted means tell the noise that an interval's po
 which stays in the processor's cache.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import float64, int64
 from numpy.typing import NDArray
 
-from pipeline.maths.kernels.compiled import compiled
-from pipeline.maths.kernels.interval_slots import add_point, robust_weight
+from pipeline.maths.kernels.compiled import compiled, named
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
+LINE, MATRIX, CUBE, NUMBERS = float64[::1], float64[:, ::1], float64[:, :, ::1], int64[::1]
+N_MOVED = 3  # features on which a pose error acts
 COUNT, CUT, REDUCED, INFORMATION, FIRST_BIN = 0, 1, 2, 3, 4  # columns of the statistics of a surface
 V, WEIGHT, COMMON, EDGE, FEATURES = 0, 1, 2, 3, 4  # columns of ``kept``; slopes follow the features
 
 
+class Points(NamedTuple):
+    """Points, ascending in time. n: their number; a *record* is counted from the first of the batch.
+
+    place_m (3, n): the laser's in the target frame, the soundings in the sonar's own; edge (n,): weight near edges;
+    surface (n,): number of the surface; height_m (n,): of the face over its surface; record, share, slot (n,): see
+    :func:`~pipeline.maths.kernels.interval_slots.slots_of`.
+    """
+
+    place_m: Array
+    edge: Array
+    surface: Integers
+    height_m: Array
+    record: Integers
+    share: Array
+    slot: Integers
+
+
+class Records(NamedTuple):
+    """Of each INS record: turns (r, 3) rad by the drift, target frame; shift (r, s, F), factors of q in v's change."""
+
+    turns: Array
+    shift: Array
+
+
+class Surfaces(NamedTuple):
+    """Of each surface: axes (s, 3, 3), rows t1, t2, n, target frame; distance_m (s,) from the frame's origin."""
+
+    axes: Array
+    distance_m: Array
+
+
+class Noise(NamedTuple):
+    """The stochastic model (:class:`pipeline.maths.adjustment.weighting.Weighting`).
+
+    factor, edge_share, scale (s,); k0, k1: bounds of IGG III; white (6,): standard deviations of a record's noise, m
+    and rad; bin_width: of the histogram of the normalised |v|; range_m, angle_rad: the sensor's standard deviations.
+    """
+
+    factor: Array
+    edge_share: Array
+    scale: Array
+    k0: float
+    k1: float
+    white: Array
+    bin_width: float
+    range_m: float
+    angle_rad: float
+
+
+class Sums(NamedTuple):
+    """What is added to. g: number of slots; F: features q of the sensor.
+
+    statistics (s, 4 + bins): COUNT … FIRST_BIN; means (g, 2): Σ w, Σ w v; normal (g, F, F), swept (g, 3, F),
+    swept_twice (g, 3, 3), right (g, F), right_swept (g, 3): see :class:`pipeline.maths.adjustment.interval_sums.
+    IntervalSums`; scalars (g, 3): Σ w v², Σ e, Σ e².
+    """
+
+    statistics: Array
+    means: Array
+    normal: Array
+    swept: Array
+    swept_twice: Array
+    right: Array
+    right_swept: Array
+    scalars: Array
+
+
+POINTS = named(Points, MATRIX, LINE, NUMBERS, LINE, NUMBERS, LINE, NUMBERS)
+RECORDS = named(Records, MATRIX, CUBE)
+SURFACES = named(Surfaces, CUBE, LINE)
+NOISE = named(Noise, LINE, LINE, LINE, float64, float64, LINE, float64, float64, float64)
+SUMS = named(Sums, MATRIX, MATRIX, CUBE, CUBE, CUBE, MATRIX, MATRIX, MATRIX)
+
+
+@compiled()
+def largest_group(record: Integers) -> int:
+    """Return the number of points of the largest group; at least 1."""
+    largest, start = 1, 0
+    for p in range(1, len(record) + 1):
+        if p == len(record) or record[p] != record[start]:
+            largest = max(largest, p - start)
+            start = p
+    return largest
+
+
+@compiled()
+def robust_weight(normalised: float, k0: float, k1: float) -> float:
+    """Return the weight of IGG III, :func:`pipeline.maths.adjustment.robust_weights.igg3_weights`."""
+    size = abs(normalised)
+    if size <= k0:
+        return 1.0
+    if size >= k1:
+        return 0.0
+    return k0 / size * ((k1 - size) / (k1 - k0)) ** 2
+
+
 @compiled()
 def common_variance(axes: Array, alpha: float, beta: float, share: float, white: Array) -> float:
-    """Return the variance of the records' white noise in v, :func:`pipeline.maths.adjustment.weighting.common_variance`.
+    """Return the variance of the records' white noise in v, as ``common_variance`` of ``adjustment.weighting``.
 
     v changes by n · δ + ω · (β t1 - α t2); ``axes`` has the rows t1, t2, n.
     """
@@ -33,17 +132,14 @@ def common_variance(axes: Array, alpha: float, beta: float, share: float, white:
 
 
 @compiled()
-def weigh(
-    v: float, variance: float, common: float, edge: float, surface: int, weights: Array, bounds: Array, bin_width: float,
-    statistics: Array,
-) -> float:  # fmt: skip
-    """Return the full weight of a point, and count it among the observations of its surface.
+def weigh(row: Array, variance: float, surface: int, noise: Noise, statistics: Array) -> None:
+    """Write the full weight of a point, and count it among the observations of its surface.
 
-    ``weights`` (3, s): variance factors, edge shares, robust scales; ``bounds`` (2,): k0 and k1 of IGG III.
+    ``row``: the point in ``kept``, with V, COMMON and EDGE; ``variance``: of the sensor's noise in v by the session.
     """
-    scaled = weights[0, surface] * variance
-    normalised = v / np.sqrt(scaled + common)
-    robust = robust_weight(normalised / weights[2, surface], bounds[0], bounds[1])
+    scaled = noise.factor[surface] * variance
+    normalised = row[V] / np.sqrt(scaled + row[COMMON])
+    robust = robust_weight(normalised / noise.scale[surface], noise.k0, noise.k1)
     of_surface = statistics[surface]
     of_surface[COUNT] += 1.0
     if robust == 0.0:
@@ -51,32 +147,64 @@ def weigh(
     elif robust < 1.0:
         of_surface[REDUCED] += 1.0
     if robust > 0.0:
-        of_surface[INFORMATION] += edge
-    of_surface[FIRST_BIN + min(int(min(abs(normalised) / bin_width, 1e9)), len(of_surface) - FIRST_BIN - 1)] += 1.0
-    return robust * edge / (scaled * weights[1, surface])
+        of_surface[INFORMATION] += row[EDGE]
+    bins = len(of_surface) - FIRST_BIN
+    of_surface[FIRST_BIN + min(int(min(abs(normalised) / noise.bin_width, 1e9)), bins - 1)] += 1.0
+    row[WEIGHT] = robust * row[EDGE] / (scaled * noise.edge_share[surface])
 
 
 @compiled()
-def add_group(
-    first: int, end: int, slot: Integers, share: Array, kept: Array, features: int, means: Array, normal: Array,
-    swept: Array, swept_twice: Array, right: Array, right_swept: Array, scalars: Array, q: Array,
-) -> None:  # fmt: skip
+def _add_point(q: Array, v: float, s: float, w: float, g: int, sums: Sums) -> None:
+    """Add a point to the sums of its slot g: of products of features one triangle alone."""
+    normal, swept, swept_twice = sums.normal[g], sums.swept[g], sums.swept_twice[g]
+    right, right_swept = sums.right[g], sums.right_swept[g]
+    for row in range(len(q)):
+        wq = w * q[row]
+        right[row] += wq * v
+        for column in range(row + 1):
+            normal[row, column] += wq * q[column]
+    for row in range(N_MOVED):
+        once = s * w * q[row]
+        right_swept[row] += once * v
+        for column in range(row, len(q)):
+            swept[row, column] += once * q[column]
+        for column in range(row, N_MOVED):
+            swept_twice[row, column] += s * once * q[column]
+
+
+@compiled()
+def add_group(first: int, end: int, points: Points, kept: Array, q: Array, sums: Sums) -> None:
     """Add the points first to end to the sums of their slots, with the features at the adjusted points.
 
-    ``means`` (slots, 2): Σ w and Σ w v; ``scalars`` (slots, 3): Σ w v², Σ e, Σ e², added to; ``q`` (F,): scratch.
+    ``q`` (F,): scratch. The weighted means of the whole group are in ``sums`` already.
     """
+    features = len(q)
     for p in range(first, end):
         row = kept[p - first]
         w, v = row[WEIGHT], row[V]
         if w <= 0.0:
             continue
-        g = slot[p]
-        information = row[COMMON] * means[g, 0]
-        noise = v - information / (1.0 + information) * (means[g, 1] / means[g, 0])
+        g = points.slot[p]
+        information = row[COMMON] * sums.means[g, 0]
+        noise = v - information / (1.0 + information) * (sums.means[g, 1] / sums.means[g, 0])
         q[0] = 1.0
         for f in range(1, features):
             q[f] = row[FEATURES + f - 1] - row[FEATURES + features + f - 2] * noise
-        add_point(q, v, share[p], w, normal[g], swept[g], swept_twice[g], right[g], right_swept[g])
-        scalars[g, 0] += w * v * v
-        scalars[g, 1] += row[EDGE]
-        scalars[g, 2] += row[EDGE] * row[EDGE]
+        _add_point(q, v, points.share[p], w, g, sums)
+        sums.scalars[g, 0] += w * v * v
+        sums.scalars[g, 1] += row[EDGE]
+        sums.scalars[g, 2] += row[EDGE] * row[EDGE]
+
+
+@compiled()
+def mirror(sums: Sums) -> None:
+    """Write the other triangles of the sums of all slots."""
+    for g in range(len(sums.normal)):
+        normal, swept, swept_twice = sums.normal[g], sums.swept[g], sums.swept_twice[g]
+        for row in range(len(normal)):
+            for column in range(row):
+                normal[column, row] = normal[row, column]
+        for row in range(N_MOVED):
+            for column in range(row):
+                swept[row, column] = swept[column, row]
+                swept_twice[row, column] = swept_twice[column, row]

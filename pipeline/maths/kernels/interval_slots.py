@@ -1,4 +1,4 @@
-"""Loops shared by the sums of both sensors: the slot of each point, its robust weight, what it adds to its slot.
+"""Loops shared by the sums of both sensors, first part: the slot of each point.
 
 A *slot* holds the sums of one interval, the points of one surface between two INS records
 (:mod:`pipeline.maths.adjustment.interval_sums`). Slots are in the order in which their first points come.
@@ -8,15 +8,14 @@ import numpy as np
 from numba import float64, int64
 from numpy.typing import NDArray
 
-from pipeline.maths.kernels.compiled import arrays, compiled
+from pipeline.maths.kernels.compiled import compiled
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-NUMBERS, WRITTEN = arrays(int64, 1), arrays(int64, 1, written=True)
-N_MOVED = 3  # features on which a pose error acts
+LINE, NUMBERS = float64[::1], int64[::1]
 
 
-@compiled((NUMBERS, NUMBERS, NUMBERS, int64, WRITTEN, arrays(float64, 1, written=True), WRITTEN, WRITTEN, WRITTEN))
+@compiled((NUMBERS, NUMBERS, NUMBERS, int64, NUMBERS, LINE, NUMBERS, NUMBERS, NUMBERS))
 def slots_of(
     t_ns: Integers, surface: Integers, record_ns: Integers, surfaces: int, record: Integers, share: Array,
     slot: Integers, slot_record: Integers, slot_surface: Integers,
@@ -52,46 +51,3 @@ def slots_of(
             found += 1
         slot[i] = last[s]
     return found
-
-
-@compiled()
-def robust_weight(normalised: float, k0: float, k1: float) -> float:
-    """Return the weight of IGG III, :func:`pipeline.maths.adjustment.robust_weights.igg3_weights`."""
-    size = abs(normalised)
-    if size <= k0:
-        return 1.0
-    if size >= k1:
-        return 0.0
-    return k0 / size * ((k1 - size) / (k1 - k0)) ** 2
-
-
-@compiled()
-def add_point(
-    q: Array, v: float, s: float, w: float, normal: Array, swept: Array, swept_twice: Array, right: Array,
-    right_swept: Array,
-) -> None:  # fmt: skip
-    """Add a point to the sums of its slot: of products of features the lower triangle alone."""
-    for row in range(len(q)):
-        wq = w * q[row]
-        right[row] += wq * v
-        for column in range(row + 1):
-            normal[row, column] += wq * q[column]
-    for row in range(N_MOVED):
-        once = s * w * q[row]
-        right_swept[row] += once * v
-        for column in range(row, len(q)):
-            swept[row, column] += once * q[column]
-        for column in range(row, N_MOVED):
-            swept_twice[row, column] += s * once * q[column]
-
-
-@compiled()
-def mirror(normal: Array, swept: Array, swept_twice: Array) -> None:
-    """Write the other triangles of the sums of a slot."""
-    for row in range(len(normal)):
-        for column in range(row):
-            normal[column, row] = normal[row, column]
-    for row in range(N_MOVED):
-        for column in range(row):
-            swept[row, column] = swept[column, row]
-            swept_twice[row, column] = swept_twice[column, row]

@@ -1,81 +1,107 @@
-"""The laser's points: from their positions to the sums of intervals, in one pass.
+"""The laser's points: from their places in the target frame to the sums of intervals, in one pass.
 
 The formulas are those of :func:`pipeline.maths.adjustment.design_matrix.laser_point_design` and of the functional model
-(:meth:`pipeline.adjustment.observation_model.ObservationModel.linearise`), which is this kernel's oracle in its test.
+(:meth:`pipeline.adjustment.observation_model.ObservationModel.linearise`), which is this loop's oracle in its test.
 """
 
+from typing import NamedTuple
+
 import numpy as np
-from numba import float64, int64
 from numpy.typing import NDArray
 
-from pipeline.maths.kernels.compiled import arrays, compiled
-from pipeline.maths.kernels.interval_group import COMMON, EDGE, FEATURES, V, WEIGHT, add_group, common_variance, weigh
+from pipeline.maths.adjustment.design_matrix import AT_45_DEG
+from pipeline.maths.kernels.compiled import compiled, named
+from pipeline.maths.kernels.interval_group import (
+    COMMON,
+    EDGE,
+    FEATURES,
+    LINE,
+    MATRIX,
+    NOISE,
+    POINTS,
+    RECORDS,
+    SUMS,
+    SURFACES,
+    WEIGHT,
+    Noise,
+    Points,
+    Records,
+    Sums,
+    Surfaces,
+    V,
+    add_group,
+    common_variance,
+    largest_group,
+    mirror,
+    weigh,
+)
 
 Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
-F = 5
-AT_45_DEG = float(np.sqrt(2) - 1)
-NUMBERS, LINE, MATRIX, CUBE = arrays(int64, 1), arrays(float64, 1), arrays(float64, 2), arrays(float64, 3)
-INTO_MATRIX, INTO_CUBE = arrays(float64, 2, written=True), arrays(float64, 3, written=True)
-SUMS = (INTO_MATRIX, INTO_MATRIX, INTO_CUBE, INTO_CUBE, INTO_CUBE, INTO_MATRIX, INTO_MATRIX, INTO_MATRIX)
+F = 5  # features q: 1, α, β, range, incidence
+SLOPES = FEATURES + F - 1
 
 
-@compiled((
-    MATRIX, LINE, LINE, NUMBERS, LINE, NUMBERS, NUMBERS, LINE, MATRIX, MATRIX, MATRIX, CUBE, CUBE, LINE, MATRIX, LINE,
-    LINE, float64, LINE, *SUMS,
-))  # fmt: skip
+class LaserPoses(NamedTuple):
+    """range_m (n,) of the points; position_m (r + 1, 3) of the body; lever_arm_m (r, 3): all in the target frame."""
+
+    range_m: Array
+    position_m: Array
+    lever_arm_m: Array
+
+
+POSES = named(LaserPoses, LINE, MATRIX, MATRIX)
+
+
+@compiled((POINTS, POSES, RECORDS, SURFACES, NOISE, SUMS))
 def sum_laser_points(
-    points: Array, range_m: Array, edge: Array, surface: Integers, height: Array, record: Integers, slot: Integers,
-    share: Array, positions: Array, lever_arm: Array, turns: Array, shift: Array, axes: Array, distance: Array,
-    weights: Array, bounds: Array, white: Array, bin_width: float, sigmas: Array, statistics: Array, means: Array,
-    normal: Array, swept: Array, swept_twice: Array, right: Array, right_swept: Array, scalars: Array,
-) -> None:  # fmt: skip
-    n, longest, start = len(range_m), 1, 0
-    for p in range(1, n + 1):
-        if p == n or record[p] != record[start]:
-            longest = max(longest, p - start)
-            start = p
-    kept, q, r, ray = np.empty((longest, FEATURES + 2 * (F - 1))), np.empty(F), np.empty(3), np.empty(3)
+    points: Points, poses: LaserPoses, records: Records, surfaces: Surfaces, noise: Noise, sums: Sums
+) -> None:
+    """Add the points to the sums of their slots, and to the statistics of their surfaces.
+
+    Between two records the body moves along one straight step; the lever arm is that of the record before.
+    """
+    n = len(points.record)
+    kept, q = np.empty((largest_group(points.record), FEATURES + 2 * (F - 1))), np.empty(F)
+    r, ray = np.empty(3), np.empty(3)
     first = 0
     while first < n:
-        k, end = record[first], first
-        while end < n and record[end] == k:
+        k, end = points.record[first], first
+        while end < n and points.record[end] == k:
             end += 1
         for p in range(first, end):
-            s, row = surface[p], kept[p - first]
-            A, along = axes[s], share[p]
-            v = -distance[s] - height[p]
+            s, row, share, range_m = points.surface[p], kept[p - first], points.share[p], poses.range_m[p]
+            A = surfaces.axes[s]
+            v = -surfaces.distance_m[s] - points.height_m[p]
             for i in range(3):
                 seen, arm = 0.0, 0.0
                 for j in range(3):
-                    body = positions[k, j] + along * (positions[k + 1, j] - positions[k, j])
-                    seen += A[i, j] * (points[j, p] - body)
-                    arm += A[i, j] * lever_arm[k, j]
-                    if i == 2:
-                        v += A[i, j] * points[j, p]
+                    step = poses.position_m[k + 1, j] - poses.position_m[k, j]
+                    seen += A[i, j] * (points.place_m[j, p] - (poses.position_m[k, j] + share * step))
+                    arm += A[i, j] * poses.lever_arm_m[k, j]
                 r[i] = seen
-                ray[i] = (seen - arm) / range_m[p]
-            across = (range_m[p] * sigmas[1]) ** 2
-            away = ray[2] * (sigmas[0] ** 2 - across)
+                ray[i] = (seen - arm) / range_m
+                v += A[2, i] * points.place_m[i, p]
+            across = (range_m * noise.angle_rad) ** 2
+            away = ray[2] * (noise.range_m**2 - across)
             variance = away * ray[2] + across
-            turning = across / range_m[p] * (1 - ray[2] * ray[2])
+            turning = across / range_m * (1 - ray[2] * ray[2])
             incidence = (np.sign(ray[2]) - ray[2]) / AT_45_DEG
-            change = shift[k, s]
-            v += change[0] + change[1] * r[0] + change[2] * r[1] + change[3] * ray[2] + change[4] * incidence
+            shift = records.shift[k, s]
+            v += shift[0] + shift[1] * r[0] + shift[2] * r[1] + shift[3] * ray[2] + shift[4] * incidence
             t0, t1, t2 = 0.0, 0.0, 0.0
             for j in range(3):
-                t0 += A[0, j] * turns[k, j]
-                t1 += A[1, j] * turns[k, j]
-                t2 += A[2, j] * turns[k, j]
+                t0 += A[0, j] * records.turns[k, j]
+                t1 += A[1, j] * records.turns[k, j]
+                t2 += A[2, j] * records.turns[k, j]
             alpha, beta = r[0] + t1 * r[2] - t2 * r[1], r[1] + t2 * r[0] - t0 * r[2]
-            common = common_variance(A, alpha, beta, along, white)
-            weight = weigh(v, variance, common, edge[p], s, weights, bounds, bin_width, statistics)
-            row[V], row[WEIGHT], row[COMMON], row[EDGE] = v, weight, common, edge[p]
-            row[FEATURES], row[FEATURES + 1] = alpha, beta
-            row[FEATURES + 2], row[FEATURES + 3] = ray[2], incidence
-            row[FEATURES + 4], row[FEATURES + 5] = away * ray[0] / variance, away * ray[1] / variance
-            row[FEATURES + 6], row[FEATURES + 7] = turning / variance, -turning / AT_45_DEG / variance
-            means[slot[p], 0] += weight
-            means[slot[p], 1] += weight * v
-        add_group(first, end, slot, share, kept, F, means, normal, swept, swept_twice, right, right_swept, scalars, q)
+            row[FEATURES], row[FEATURES + 1], row[FEATURES + 2], row[FEATURES + 3] = alpha, beta, ray[2], incidence
+            row[SLOPES], row[SLOPES + 1] = away * ray[0] / variance, away * ray[1] / variance
+            row[SLOPES + 2], row[SLOPES + 3] = turning / variance, -turning / AT_45_DEG / variance
+            row[V], row[EDGE] = v, points.edge[p]
+            row[COMMON] = common_variance(A, alpha, beta, share, noise.white)
+            weigh(row, variance, s, noise, sums.statistics)
+            sums.means[points.slot[p], 0] += row[WEIGHT]
+            sums.means[points.slot[p], 1] += row[WEIGHT] * v
+        add_group(first, end, points, kept, q, sums)
         first = end
+    mirror(sums)
