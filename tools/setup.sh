@@ -88,7 +88,7 @@ pip() { .venv/bin/python -m pip --disable-pip-version-check "$@" </dev/null; }
 pip install -q -c constraints.txt setuptools && pip install -q -c constraints.txt --no-build-isolation -e ".${EXTRAS:+[$EXTRAS]}" ||
     fail "packages could not be installed (see above); correct this and run make setup again"
 .venv/bin/python -c '
-import open3d, pyarrow, rerun, stages.cli
+import open3d, pyarrow, rerun, stages.adjust, stages.cli
 from pipeline.maths.kernels.compiled import compile_all
 compile_all()' || fail "the packages do not load, or the loops of pipeline/maths/kernels do not compile (see above)"
 echo "$wanted" >"$stamp"

@@ -9,10 +9,15 @@ calls none of their functions. Imports in these functions count only if the pack
 
 import ast
 import functools
+import hashlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from pipeline.atomic_files import sha256
+from pipeline.run.known_imports import KnownImports
+
 PACKAGES = ("pipeline", "stages")  # every other package is a library, identified by its version
+KNOWN = KnownImports(Path(__file__).with_name("__pycache__") / f"imports-{sha256(Path(__file__))[:12]}.json")
 STATEMENTS = (ast.stmt, ast.excepthandler, ast.match_case)  # these hold all statements of a module
 
 
@@ -39,6 +44,7 @@ def import_closure(root: Path, modules: Sequence[str]) -> list[Path]:
         if path is not None:
             closure.add(path)
             waiting += [(module, True) for module in imported_modules(root, path, name, inside)]
+    KNOWN.keep()
     folders = {path.parent for path in closure}
     return sorted(closure | {path for folder in folders for path in folder.iterdir() if _is_data(path)})
 
@@ -94,6 +100,17 @@ def _imports(path: Path, name: str, inside: bool) -> tuple[tuple[str, str], ...]
     If module a.c names the program "b.py" in its folder, the pair is ("a", "b") too.
     """
     source = path.read_bytes()
+    if b".py" in source:  # it may name programs, and whether there are such depends on its folder
+        return _parsed(source, path, name, inside)
+    key = hashlib.sha256(b"\0".join([name.encode(), path.name.encode(), b"%d" % inside, source])).hexdigest()
+    found = KNOWN.get(key)
+    if found is None:
+        found = _parsed(source, path, name, inside)
+        KNOWN.put(key, found)
+    return found
+
+
+def _parsed(source: bytes, path: Path, name: str, inside: bool) -> tuple[tuple[str, str], ...]:
     tree = ast.parse(source)
     package = name if path.name == "__init__.py" else name.rpartition(".")[0]
     imports: list[tuple[str, str]] = []

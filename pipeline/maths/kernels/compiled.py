@@ -5,7 +5,6 @@ other modules, and constants, are part of it. So the name of the code's file hol
 """
 
 import hashlib
-import importlib
 from collections.abc import Callable, Sequence
 from functools import lru_cache, update_wrapper
 from pathlib import Path
@@ -17,6 +16,7 @@ from numba import njit, types
 Function = TypeVar("Function", bound=Callable[..., Any])
 FOLDER = Path(__file__).parent
 _LOCK = Lock()
+_FUNCTIONS: list["_Compiled"] = []
 
 
 @lru_cache(maxsize=1)
@@ -30,6 +30,7 @@ class _Compiled:
     def __init__(self, function: Callable[..., Any], signature: tuple[Any, ...]) -> None:
         self._function, self._signature = function, signature
         self._code: Callable[..., Any] | None = None
+        _FUNCTIONS.append(self)
         update_wrapper(self, function)
 
     def __call__(self, *arguments: Any) -> Any:
@@ -76,9 +77,6 @@ def compiled(arguments: Sequence[Any] | None = None) -> Callable[[Function], Fun
 
 
 def compile_all() -> None:
-    """Compile every function of this folder that is not compiled yet, so that no run has to."""
-    for path in sorted(FOLDER.glob("[a-z]*.py")):
-        module = importlib.import_module(f"{__package__}.{path.stem}")
-        for one in vars(module).values():
-            if isinstance(one, _Compiled):
-                one.compile()
+    """Compile the functions of all modules that are loaded, so that no run has to."""
+    for one in _FUNCTIONS:
+        one.compile()
