@@ -132,6 +132,27 @@ def common_variance(axes: Array, alpha: float, beta: float, share: float, white:
 
 
 @compiled()
+def turn_features(row: Array, r: Array, records: Records, k: int, axes: Array, surface: int) -> None:
+    """Add to V what drift and parameters change, and write α and β as seen with the drift's turn.
+
+    ``row``: the point in ``kept``, with V and all features but α and β; ``r``: from the body, surface axes.
+    """
+    shift = records.shift[k, surface]
+    v = row[V] + shift[0] + shift[1] * r[0] + shift[2] * r[1]
+    for f in range(3, len(shift)):
+        v += shift[f] * row[FEATURES + f - 1]
+    row[V] = v
+    t0, t1, t2 = 0.0, 0.0, 0.0
+    for j in range(3):
+        turn = records.turns[k, j]
+        t0 += axes[0, j] * turn
+        t1 += axes[1, j] * turn
+        t2 += axes[2, j] * turn
+    row[FEATURES] = r[0] + t1 * r[2] - t2 * r[1]
+    row[FEATURES + 1] = r[1] + t2 * r[0] - t0 * r[2]
+
+
+@compiled()
 def weigh(row: Array, variance: float, surface: int, noise: Noise, statistics: Array) -> None:
     """Write the full weight of a point, and count it among the observations of its surface.
 

@@ -33,6 +33,7 @@ from pipeline.maths.kernels.interval_group import (
     common_variance,
     largest_group,
     mirror,
+    turn_features,
     weigh,
 )
 
@@ -85,23 +86,15 @@ def sum_laser_points(
             away = ray[2] * (noise.range_m**2 - across)
             variance = away * ray[2] + across
             turning = across / range_m * (1 - ray[2] * ray[2])
-            incidence = (np.sign(ray[2]) - ray[2]) / AT_45_DEG
-            shift = records.shift[k, s]
-            v += shift[0] + shift[1] * r[0] + shift[2] * r[1] + shift[3] * ray[2] + shift[4] * incidence
-            t0, t1, t2 = 0.0, 0.0, 0.0
-            for j in range(3):
-                t0 += A[0, j] * records.turns[k, j]
-                t1 += A[1, j] * records.turns[k, j]
-                t2 += A[2, j] * records.turns[k, j]
-            alpha, beta = r[0] + t1 * r[2] - t2 * r[1], r[1] + t2 * r[0] - t0 * r[2]
-            row[FEATURES], row[FEATURES + 1], row[FEATURES + 2], row[FEATURES + 3] = alpha, beta, ray[2], incidence
+            row[V], row[EDGE], row[FEATURES + 2] = v, points.edge[p], ray[2]
+            row[FEATURES + 3] = (np.sign(ray[2]) - ray[2]) / AT_45_DEG
             row[SLOPES], row[SLOPES + 1] = away * ray[0] / variance, away * ray[1] / variance
             row[SLOPES + 2], row[SLOPES + 3] = turning / variance, -turning / AT_45_DEG / variance
-            row[V], row[EDGE] = v, points.edge[p]
-            row[COMMON] = common_variance(A, alpha, beta, share, noise.white)
+            turn_features(row, r, records, k, A, s)
+            row[COMMON] = common_variance(A, row[FEATURES], row[FEATURES + 1], share, noise.white)
             weigh(row, variance, s, noise, sums.statistics)
             sums.means[points.slot[p], 0] += row[WEIGHT]
-            sums.means[points.slot[p], 1] += row[WEIGHT] * v
+            sums.means[points.slot[p], 1] += row[WEIGHT] * row[V]
         add_group(first, end, points, kept, q, sums)
         first = end
     mirror(sums)
