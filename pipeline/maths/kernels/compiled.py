@@ -2,6 +2,9 @@
 
 The library numba looks at a function's own file alone to see whether its machine code is out of date. But functions of
 other modules, and constants, are part of it. So the name of the code's file holds a digest of them.
+
+Numbers behave as numpy's: x / 0 is infinite, and raises nothing. Functions that are part of others are copied into them:
+a call would cost as much as the arithmetic. No formula is reordered (no fastmath).
 """
 
 import hashlib
@@ -15,6 +18,7 @@ from numba import njit, types
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 FOLDER = Path(__file__).parent
+LIKE_NUMPY = {"nogil": True, "error_model": "numpy"}
 _LOCK = Lock()
 _FUNCTIONS: list["_Compiled"] = []
 
@@ -46,9 +50,9 @@ class _Compiled:
                 digest = hashlib.sha256(_sources() + repr(sorted(numbers.items())).encode()).hexdigest()[:12]
                 function.__qualname__ = f"{function.__name__}-{digest}"  # part of the name of the code's file
                 try:
-                    self._code = njit(self._signature, nogil=True, cache=True)(function)
+                    self._code = njit(self._signature, **LIKE_NUMPY, cache=True)(function)
                 except RuntimeError:  # no folder for the file may be written
-                    self._code = njit(self._signature, nogil=True)(function)
+                    self._code = njit(self._signature, **LIKE_NUMPY)(function)
         return self._code
 
 
@@ -70,7 +74,7 @@ def compiled(arguments: Sequence[Any] | None = None) -> Callable[[Function], Fun
 
     def decorator(function: Function) -> Function:
         if signature is None:
-            return cast(Function, njit(nogil=True)(function))
+            return cast(Function, njit(**LIKE_NUMPY, forceinline=True)(function))
         return cast(Function, _Compiled(function, signature))
 
     return decorator
