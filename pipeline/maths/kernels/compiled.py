@@ -3,8 +3,8 @@
 The library numba looks at a function's own file alone to see whether its machine code is out of date. But functions of
 other modules, and constants, are part of it. So the name of the code's file holds a digest of them.
 
-Numbers behave as numpy's: x / 0 is infinite, and raises nothing. Functions that are part of others are copied into them:
-a call would cost as much as the arithmetic. No formula is reordered (no fastmath).
+Numbers behave as numpy's: x / 0 is infinite, and raises nothing. Functions that are part of others are copied into
+them: a call would cost as much as the arithmetic. No formula is reordered (no fastmath).
 """
 
 import hashlib
@@ -18,7 +18,7 @@ from numba import njit, types
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 FOLDER = Path(__file__).parent
-LIKE_NUMPY = {"nogil": True, "error_model": "numpy"}
+LIKE_NUMPY: Any = {"nogil": True, "error_model": "numpy"}
 _LOCK = Lock()
 _FUNCTIONS: list["_Compiled"] = []
 
