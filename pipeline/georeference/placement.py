@@ -32,8 +32,8 @@ def laser_in_pool(
     """
     mount = mount_of(laser.mount)
     if laser.frame == "laser":
-        body = (mount.R_body_from_sensor @ points.T).T + mount.lever_arm_body_m
-        return points, context.trajectory.points_from_body(t_ns, body)
+        placed = context.trajectory.points_from_sensor(t_ns, points, mount.R_body_from_sensor, mount.lever_arm_body_m)
+        return points, placed
     pool = context.frame.points_from_ecef(points)
     positions, R_pool_from_body = context.trajectory.poses_at(t_ns)
     body = np.einsum("nji,nj->ni", R_pool_from_body, pool - positions)
@@ -77,5 +77,5 @@ def soundings_in_pool(
             water_level_m - head[:, 2],
             Cast(*np.array(mbes.svp, dtype=np.float64).T),
         )
-    body = sensor @ mount.R_body_from_sensor.T + mount.lever_arm_body_m
-    return sensor, context.trajectory.points_from_body(t_ns, body), possible
+    placed = context.trajectory.points_from_sensor(t_ns, sensor, mount.R_body_from_sensor, mount.lever_arm_body_m)
+    return sensor, placed, possible

@@ -12,9 +12,8 @@ from pipeline.config.pool import Segment
 from pipeline.config.stage_settings import SonarBeams
 from pipeline.maths.geometry.trajectory import Trajectory
 from pipeline.maths.target.beams import TargetBeams
-from pipeline.maths.target.labelling import Labels, label_points, weight_beside_shadows
+from pipeline.maths.target.labelling import Labels, label_points, near_planes, weight_beside_shadows
 from pipeline.maths.target.model import TargetModel
-from pipeline.maths.target.near_planes import near_planes
 from pipeline.mount import Mounted, mount_of
 from pipeline.target.label_limits import laser_limits, sonar_limits
 from pipeline.target.search_results import LocatedTarget, ProvisionalMount
@@ -99,23 +98,20 @@ def _label_laser(batch: Batch, context: LabellingContext) -> BatchResult:
     model = context.model
     mount = context.laser if context.mbes is not None else context.provisional_mount
     settings = laser_limits(context.settings, model.water_level_m, context.target.gate_m, context.laser_beam_m)
-    body = point_array(batch, "laser_m") @ mount.R_body_from_sensor.T + mount.lever_arm_body_m
-    points = context.corrected.points_from_body(batch["t_ns"], body)
+    R_body_from_laser, lever_arm_m = mount.R_body_from_sensor, mount.lever_arm_body_m
+    sensor = point_array(batch, "laser_m")
+    points = context.corrected.points_from_sensor(batch["t_ns"], sensor, R_body_from_laser, lever_arm_m)
     dry = points[:, 2] > model.water_level_m + context.settings.water_margin_m / 2
-    near, planes = near_planes(model, points, settings.gate_m, dry, settings.seen)
-    points, t_ns = points[near], batch["t_ns"][near]
-    rays = points - context.corrected.track_of_point(t_ns, mount.lever_arm_body_m)
-    ranges = np.sqrt(np.einsum("ni,ni->n", rays, rays))
-    rays /= ranges[:, None]
-    labels = label_points(model, points, TargetBeams(rays, ranges), settings, planes)
+    rays = TargetBeams.from_origins(context.corrected.track_of_point(batch["t_ns"], lever_arm_m), points)
+    labels = label_points(model, points, rays, settings, dry)
     on = np.flatnonzero(labels.face >= 0)
-    rows = near[on]
-    placed = context.trajectory.points_from_body(t_ns[on], body[rows])
-    columns = {"t_ns": t_ns[on], "pass": batch["pass"][rows], "face": labels.face[on]}
-    columns |= xyz_columns("{}_laser_m", [batch[f"{axis}_laser_m"][rows] for axis in "xyz"])
+    t_ns = batch["t_ns"][on]
+    placed = context.trajectory.points_from_sensor(t_ns, sensor[on], R_body_from_laser, lever_arm_m)
+    columns = {"t_ns": t_ns, "pass": batch["pass"][on], "face": labels.face[on]}
+    columns |= xyz_columns("{}_laser_m", [batch[f"{axis}_laser_m"][on] for axis in "xyz"])
     columns |= xyz_columns("{}_target_m", placed.T)
     columns["cos_incidence"], columns["edge_weight"] = labels.cos_incidence[on], labels.edge_weight[on]
-    counts = _counts("below or near the water line", dry, "near an edge", near, labels)
+    counts = _counts("below or near the water line", dry, "near an edge", labels)
     return BatchResult({"laser_labelled": columns}, counts)
 
 
@@ -123,13 +119,13 @@ def _label_soundings(batch: Batch, context: LabellingContext, mbes: SonarBeams) 
     model, mount, trajectory = context.model, context.provisional_mount, context.corrected
     lever_arm_m = mount.lever_arm_body_m
     sensor = point_array(batch, "mbes_m")
-    points = trajectory.points_from_body(batch["t_ns"], sensor @ mount.R_body_from_sensor.T + lever_arm_m)
+    points = trajectory.points_from_sensor(batch["t_ns"], sensor, mount.R_body_from_sensor, lever_arm_m)
     settings = sonar_limits(context.settings, model.water_level_m, context.mount.gate_m)
     wet = points[:, 2] < model.water_level_m - context.settings.water_margin_m / 2
-    near, planes = near_planes(model, points, settings.gate_m, wet, settings.seen)
+    near = np.flatnonzero(near_planes(model, points, settings.gate_m, wet, settings.seen))
     _, R_target_from_body = trajectory.poses_at(batch["t_ns"][near])
     beams = beams_in_target(R_target_from_body, mount.R_body_from_sensor, sensor[near], mbes)
-    labels = label_points(model, points[near], beams, settings, planes)
+    labels = label_points(model, points[near], beams, settings)
     on = np.flatnonzero(labels.face >= 0)
     origins = trajectory.track_of_point(batch["t_ns"][near[on]], lever_arm_m)
     on_faces = _BeamsOnFaces(labels.face[on], on, beams, origins, context.surface)
@@ -139,7 +135,8 @@ def _label_soundings(batch: Batch, context: LabellingContext, mbes: SonarBeams) 
     rows = near[on]
     names = ("t_ns", "pass", "ping", "beam", "x_mbes_m", "y_mbes_m", "z_mbes_m")
     columns = {name: batch[name][rows] for name in names} | {"face": labels.face[on], "edge_weight": weight}
-    counts = _counts("above or near the water line", wet, "footprint near an edge", near, labels)
+    counts = _counts("above or near the water line", wet, "footprint near an edge", labels)
+    counts["off every face"] += int(wet.sum()) - len(near)
     counts |= {"footprint partly on another face": hidden, "used": len(on)}
     return BatchResult({"soundings_labelled": columns}, counts)
 
@@ -160,13 +157,11 @@ class _BeamsOnFaces:
             yield self.surface.first_met(self.origins_m[rows], rays)
 
 
-def _counts(
-    other_side: str, own_side: NDArray[np.bool_], edge: str, near: NDArray[np.int64], labels: Labels
-) -> dict[str, int]:
+def _counts(other_side: str, own_side: NDArray[np.bool_], edge: str, labels: Labels) -> dict[str, int]:
     """Return the number of points by reason why they have no label, and the labelled ones as ``used``."""
     return {
         other_side: int((~own_side).sum()),
-        "off every face": int(own_side.sum()) - len(near) + int(labels.off_surface.sum()),
+        "off every face": int(labels.off_surface.sum()),
         edge: int(labels.near_edge.sum()),
         "ray too flat": int(labels.grazing.sum()),
         "used": int((labels.face >= 0).sum()),

@@ -14,7 +14,9 @@ from pathlib import Path
 from threading import Lock
 from typing import Any, TypeVar, cast
 
+import numpy as np
 from numba import njit, types
+from numpy.typing import NDArray
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 FOLDER = Path(__file__).parent
@@ -56,8 +58,15 @@ class _Compiled:
         return self._code
 
 
+def block(values: NDArray[Any]) -> NDArray[Any]:
+    """Return values as one block of memory that may be written, as compiled functions ask for."""
+    return np.require(values, values.dtype, ("C", "W"))
+
+
 def named(cls: type[tuple[Any, ...]], *parts: Any) -> Any:
     """Return numba's type of a named tuple of these parts."""
+    if len(set(parts)) == 1:
+        return types.NamedUniTuple(parts[0], len(parts), cls)  # type: ignore[no-untyped-call]
     return types.NamedTuple(parts, cls)  # type: ignore[no-untyped-call]
 
 

@@ -6,6 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.maths.kernels.compiled import block
+from pipeline.maths.kernels.labels import rays
+
 Array = NDArray[np.float64]
 
 
@@ -38,6 +41,13 @@ class TargetBeams:
     def head_on(cls, count: int) -> "TargetBeams":
         """Return beams with unknown rays, for averaged points: every face counts as seen from its front."""
         return cls(np.zeros((count, 3)), np.zeros(count))
+
+    @classmethod
+    def from_origins(cls, origins_m: Array, points_m: Array) -> "TargetBeams":
+        """Return round beams from origins (n, 3) m to points (n, 3) m."""
+        direction, range_m = np.empty((3, len(points_m))), np.empty(len(points_m))
+        rays(block(origins_m.T), block(points_m.T), direction, range_m)
+        return cls(direction.T, range_m)
 
     def corners(self, rows: NDArray[np.int64], beyond_m: float = 0.0) -> Iterator[Array]:
         """Yield rays (n, 3) along each of the four corners of these beams; across, the corners include the stray.

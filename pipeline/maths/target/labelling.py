@@ -14,19 +14,17 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.maths.kernels import labels as kernel
+from pipeline.maths.kernels.compiled import block
 from pipeline.maths.target.beams import TargetBeams
-from pipeline.maths.target.face import Face
 from pipeline.maths.target.model import TargetModel
-from pipeline.maths.target.near_planes import NearPlane, planes_with_points
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Integers = NDArray[np.int64]
 
 NO_FACE = -1
-MOST_SLANTED = 0.01  # smallest cosine of incidence by which the length of a round beam's spot is computed
 RAMP_STEPS = 6  # of the ramp beside what hides a footprint
-ROUNDING_M = 1e-6  # rounding of the heights of points on a horizontal face
 
 
 @dataclass(frozen=True)
@@ -134,77 +132,12 @@ def weight_beside_shadows(model: TargetModel, beams: BeamsOnFaces, ramp_m: float
     return weight
 
 
-class _Candidates:
-    """The best face of each point so far, while face after face is tried."""
-
-    def __init__(self, points_m: Array, beams: TargetBeams, settings: LabelSettings) -> None:
-        count = len(points_m)
-        self.points_m, self.beams, self.settings = points_m, beams, settings
-        self.sine = np.sin(settings.min_grazing_rad) if beams.directions.any() else 0.0
-        self.face = np.full(count, NO_FACE, dtype=np.int16)
-        self.cosine, self.edge_weight = np.zeros(count), np.zeros(count)
-        self.distance_m = np.full(count, np.inf)
-        self.near_plane, self.too_flat = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
-
-    def try_plane(self, plane: NearPlane, faces: tuple[Face, ...]) -> None:
-        """Try all faces in one plane."""
-        met, ranges = plane.intersections(self.points_m, self.beams, self.sine)
-        for number in plane.faces:
-            self._try_face(number, faces[number], plane, met, ranges)
-
-    def _try_face(self, number: int, face: Face, plane: NearPlane, met: Array, ranges: Array) -> None:
-        settings, beams = self.settings, self.beams
-        low, high = face.vertices_m[:, 2].min() - ROUNDING_M, face.vertices_m[:, 2].max() + ROUNDING_M
-        level = np.flatnonzero((met[:, 2] >= low) & (met[:, 2] <= high))
-        rows, away, on_plane, reached = plane.rows[level], plane.distance_m[level], met[level], ranges[level]
-        clearance = face.clearance(on_plane)
-        inside = (clearance >= 0) & (on_plane[:, 2] > settings.lowest_m) & (on_plane[:, 2] < settings.highest_m)
-        self.near_plane[rows[inside]] = True
-        rows, away, on_plane, reached = rows[inside], away[inside], on_plane[inside], reached[inside]
-        cosine = -(beams.directions[rows] @ face.normal)
-        steep = cosine >= self.sine
-        self.too_flat[rows[~steep]] = True
-        steep &= face.clearance(self.points_m[rows] - away[:, None] * plane.axis) >= settings.margin_m / 2
-        if beams.half_widths:
-            rows, away, on_plane, cosine = rows[steep], away[steep], on_plane[steep], cosine[steep]
-            reached = reached[steep]
-            spreads = beams.spreads(rows, face.normal, reached)
-            stray_m = beams.stray_on(rows, face.normal, reached)
-            limits = {"margin_m": settings.margin_m, "corner_factor": settings.corner_factor}
-            spare_m = face.clearance(on_plane, *spreads, stray_m=stray_m, **limits)
-            half = settings.corner_factor * sum(np.abs(spread[:, 2]) for spread in spreads)
-        else:
-            half = settings.spot_m / np.maximum(cosine, MOST_SLANTED)
-            spare_m = np.where(steep, clearance[inside] - np.maximum(settings.margin_m, half), -1.0)
-            half = np.zeros(1)
-        height = on_plane[:, 2]
-        spare_m = np.minimum(spare_m, np.minimum(settings.highest_m - height, height - settings.lowest_m) - half)
-        better = (spare_m > 0) & (np.abs(away) < self.distance_m[rows])
-        rows = rows[better]
-        self.face[rows], self.cosine[rows] = number, cosine[better]
-        self.edge_weight[rows] = np.minimum(1.0, spare_m[better] / settings.ramp_m) if settings.ramp_m else 1.0
-        self.distance_m[rows] = np.abs(away[better])
-
-    def labels(self) -> Labels:
-        """Return the faces of the points, and for points without a face the reason."""
-        free = self.face == NO_FACE
-        near_edge = free & self.near_plane & ~self.too_flat
-        return Labels(
-            face=self.face,
-            cos_incidence=self.cosine,
-            edge_weight=self.edge_weight,
-            off_surface=free & ~self.near_plane,
-            near_edge=near_edge,
-            grazing=free & self.too_flat,
-        )
-
-
 def label_points(
     model: TargetModel,
     points_m: Array,
     beams: TargetBeams,
     settings: LabelSettings,
-    planes: Iterable[NearPlane] | None = None,
+    among: Flags | None = None,
 ) -> Labels:
     """Label points by the faces of the target.
 
@@ -230,10 +163,44 @@ def label_points(
         Rays of the points.
     settings
         Limits for the labels.
-    planes
-        Planes and their points from ``near_planes``, for ``points_m`` that are the rows it returned; None: all planes.
+    among
+        Mask (n,) of the points that may have a label; None: all. The others have no reason.
     """
-    candidates = _Candidates(points_m, beams, settings)
-    for plane in planes_with_points(model, points_m, settings.gate_m, seen=settings.seen) if planes is None else planes:
-        candidates.try_plane(plane, model.faces)
-    return candidates.labels()
+    sine = float(np.sin(settings.min_grazing_rad)) if beams.directions.any() else 0.0
+    limits = kernel.Limits(
+        gate_m=settings.gate_m,
+        margin_m=settings.margin_m,
+        sine=sine,
+        lowest_m=settings.lowest_m,
+        highest_m=settings.highest_m,
+        spot_m=settings.spot_m,
+        corner_factor=settings.corner_factor,
+        ramp_m=settings.ramp_m,
+    )
+    n = len(points_m)
+    labels = kernel.Labels(np.empty(n, np.int16), np.empty(n), np.empty(n), np.empty(n, np.int8))
+    every = np.ones(n, dtype=bool) if among is None else np.require(among, bool, ("C", "W"))
+    kernel.label(block(points_m.T), every, _beam_arrays(beams), model.tables(settings.seen), limits, labels)
+    return Labels(
+        face=labels.face,
+        cos_incidence=labels.cosine,
+        edge_weight=labels.edge_weight,
+        off_surface=labels.reason == kernel.OFF_SURFACE,
+        near_edge=labels.reason == kernel.NEAR_EDGE,
+        grazing=labels.reason == kernel.GRAZING,
+    )
+
+
+def near_planes(model: TargetModel, points_m: Array, reach_m: float, among: Flags, seen: str) -> Flags:
+    """Return which of the points among (n,) lie within ``reach_m`` of the plane of a face; parameters as above."""
+    near = np.array(among, dtype=bool)
+    kernel.near_planes(block(points_m.T), reach_m, model.tables(seen), near)
+    return near
+
+
+def _beam_arrays(beams: TargetBeams) -> kernel.Beams:
+    halves = [half.T for half in beams.half_widths]
+    half = np.zeros((2, 3, len(beams.ranges_m) if halves else 0))
+    half[: len(halves)] = halves if halves else half[:0]
+    near_m = np.array(beams.near_m, dtype=np.float64)
+    return kernel.Beams(block(beams.directions.T), block(beams.ranges_m), half, near_m, float(beams.stray))

@@ -10,12 +10,15 @@ Nothing downstream knows the kind of the target: other modules use only faces wi
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.maths.geometry.trajectory import Trajectory
+from pipeline.maths.kernels.faces import FaceTables
 from pipeline.maths.target.face import HORIZONTAL_COSINE, Face
+from pipeline.maths.target.face_tables import face_tables
 
 Array = NDArray[np.float64]
 
@@ -97,6 +100,14 @@ class TargetModel:
 
     def _depth(self, face: Face) -> float:
         return float(min(face.vertices_m[:, 2].max(), self.water_level_m) - face.vertices_m[:, 2].min())
+
+    def tables(self, seen: str) -> FaceTables:
+        """Return the faces as arrays, with the planes of those that are seen: "dry", "wet" or "both"."""
+        return self._tables[seen]
+
+    @cached_property
+    def _tables(self) -> dict[str, FaceTables]:
+        return {seen: face_tables(self.faces, seen) for seen in ("dry", "wet", "both")}
 
     def bounds(self) -> tuple[Array, Array]:
         """Return the lowest and the highest corner (3,) of the box round all faces."""
