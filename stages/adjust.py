@@ -137,6 +137,7 @@ def session_data(inputs: Inputs, config: Config, drift: Drift) -> SessionData:
         noise=pose_noise(drift, config.ins.white),
         drift=drift_prior(config.ins.drift_within),
         as_built=config.as_built,
+        mapper=inputs.laser_labelled.here,
     )
 
 

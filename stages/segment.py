@@ -29,7 +29,7 @@ from pipeline.artefacts.catalogue.target import (
 )
 from pipeline.artefacts.counts import counts_table, used, why_none_used
 from pipeline.artefacts.from_tables import trajectory_in_pool
-from pipeline.artefacts.streams import EMPTY_STREAM, BatchResult, Chunk, Stream
+from pipeline.artefacts.streams import EMPTY_STREAM, BatchResult, Chunk, Mapper, Stream, serial
 from pipeline.artefacts.to_tables import faces_table
 from pipeline.config.pool import Segment
 from pipeline.config.stage_settings import (
@@ -112,7 +112,8 @@ def prepare(inputs: Inputs, config: Config) -> LabellingContext:
         return context
     sample = {name: sample_near_target(streams[name], name, count, context) for name, count in counts.items()}
     drift = drift_model(config.ins, inputs.ins_sigmas, inputs.passes)
-    problem_at = partial(provisional_problem, noise=pose_noise(drift, config.ins.white), config=config)
+    noise, mapper = pose_noise(drift, config.ins.white), inputs.laser_pool.here
+    problem_at = partial(provisional_problem, noise=noise, config=config, mapper=mapper)
     return with_adjusted_sample(context, sample, problem_at, config.adjust, config.ingest.max_gap_s)
 
 
@@ -149,7 +150,9 @@ def search(inputs: Inputs, config: Config) -> LabellingContext:
     )
 
 
-def provisional_problem(context: LabellingContext, noise: PoseNoise, config: Config) -> CalibrationProblem:
+def provisional_problem(
+    context: LabellingContext, noise: PoseNoise, config: Config, mapper: Mapper = serial
+) -> CalibrationProblem:
     """Return the calibration problem of the provisional adjustment, which starts from the designed surfaces."""
     mount, laser = context.provisional_mount, config.laser
     session = SessionData(
@@ -160,6 +163,7 @@ def provisional_problem(context: LabellingContext, noise: PoseNoise, config: Con
         noise=noise,
         drift=EXACT,
         as_built=config.as_built,
+        mapper=mapper,
     )
     if config.mbes is not None:
         problem = sonar_problem(session, mount, {"laser": laser, "mbes": config.mbes})

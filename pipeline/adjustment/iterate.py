@@ -76,7 +76,7 @@ class Iterate:
         step[estimated] = solution.step
         sums = updated_sums(self.linearisation, step, DriftEstimate(self.drift.knots, drift_step))
         drift = self.drift.updated(drift_step)
-        linearisation = Linearisation(sums, state.updated(step), self.linearisation.body, drift)
+        linearisation = replace(self.linearisation, sums=sums, state=state.updated(step), drift=drift)
         return Iterate(linearisation, drift, self.priors), solution
 
     def record_noise(self, noise: PoseNoise) -> EpochVarianceFactor:

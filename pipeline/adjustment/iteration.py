@@ -219,7 +219,8 @@ def _weighted_iteration(
         # read all points, and take the variance factors of sensors and surfaces from their scatter
         accumulation, weighting = reweighted(accumulate(streams, model, values), values.state, values.weighting)
         drift = values.drift or model.body.zero_drift(accumulation.records, prior.noise, gap_s)
-        start = Iterate(Linearisation(accumulation.sums, values.state, model.body, drift), drift, prior.priors)
+        linearisation = Linearisation(accumulation.sums, values.state, model.body, drift, problem.mapper)
+        start = Iterate(linearisation, drift, prior.priors)
         # solve and step
         stepped, solution = start.stepped(replace(prior.noise, white=weighting.white), estimated)
         deficient = solution.deficiency > 0

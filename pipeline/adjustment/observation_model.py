@@ -214,9 +214,9 @@ class ObservationModel:
 
     def points_in_target(self, batch: Batch, state: State) -> Array:
         """Return the calibrated sensor's points (n, 3) m in the target frame, with the mount of the state."""
-        positions, R_target_from_body = self.body.trajectory.poses_at(batch["t_ns"])
-        points_body_m = point_array(batch, f"{state.calibrated}_m") @ state.R_body_from_sensor.T + state.lever_arm_m
-        return np.asarray(positions + np.einsum("nij,nj->ni", R_target_from_body, points_body_m))
+        points_m = point_array(batch, f"{state.calibrated}_m")
+        trajectory, mount = self.body.trajectory, (state.R_body_from_sensor, state.lever_arm_m)
+        return trajectory.points_from_sensor(batch["t_ns"], points_m, *mount)
 
     def _ordered(self, batch: Batch) -> tuple[Batch, Integers]:
         """Return the batch ordered by surface, and on each surface by time, with the numbers (n,) of the surfaces."""

@@ -17,7 +17,7 @@ from pipeline.maths.adjustment.normal_equations import residual_shift
 from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.robust_weights import BINS
 from pipeline.maths.adjustment.weighting import Weighting
-from pipeline.maths.kernels.interval_group import FIRST_BIN, Noise, Points, Records, Sums, Surfaces
+from pipeline.maths.kernels.interval_group import FIRST_BIN, OBSERVED, Noise, Points, Records, Sums, Surfaces
 from pipeline.maths.kernels.interval_slots import slots_of
 from pipeline.maths.kernels.laser_sums import LaserPoses, sum_laser_points
 from pipeline.maths.kernels.sounding_sums import SonarPoses, sum_soundings
@@ -28,10 +28,19 @@ Integers = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class SummedBatch:
-    """Sums of the intervals (not ordered), and of each surface (s, 4 + bins) the columns of ``interval_group``."""
+    """Sums of the intervals (not ordered), and of each surface (s, 4 + bins) the columns of ``interval_group``.
+
+    points: the batch in order of time; record, share (n,): INS record before each, and place from there to the next;
+    surface (n,): its surface; observed (4, n): rows of ``interval_group.OBSERVED``, or (4, 0).
+    """
 
     sums: IntervalSums
     statistics: Array
+    points: Batch
+    record: Integers
+    share: Array
+    surface: Integers
+    observed: Array
 
 
 @dataclass(frozen=True)
@@ -53,7 +62,9 @@ class _Slots:
         return cls(record, share, slot, record_of[:number], surface_of[:number])
 
 
-def summed(batch: Batch, model: ObservationModel, sensor: str, values: CurrentValues) -> SummedBatch:
+def summed(
+    batch: Batch, model: ObservationModel, sensor: str, values: CurrentValues, residuals: bool = False
+) -> SummedBatch:
     """Return the sums of a batch at the current values.
 
     Parameters
@@ -66,11 +77,15 @@ def summed(batch: Batch, model: ObservationModel, sensor: str, values: CurrentVa
         The sensor that observed the points.
     values : CurrentValues
         Parameters, drift and weights at which to linearise.
+    residuals : bool
+        Whether to return the residual of each point, and the sums of each interval and face, with the number of the
+        face in place of that of its surface.
     """
     points, state, features = _in_order_of_time(batch), values.state, N_FEATURES[sensor]
     surface = model.faces.surface[points["face"]].astype(np.int64)
     surfaces = len(state.surfaces)
-    slots = _Slots.of(points["t_ns"], surface, model.body.trajectory.t_ns, surfaces)
+    apart = points["face"].astype(np.int64) if residuals else surface
+    slots = _Slots.of(points["t_ns"], apart, model.body.trajectory.t_ns, max(surfaces, len(model.faces.names)))
     errors = model.pose_errors(values.drift, slots.record)
     first = int(errors.record[0]) if len(errors.record) else 0
     of_points = Points(
@@ -90,13 +105,21 @@ def summed(batch: Batch, model: ObservationModel, sensor: str, values: CurrentVa
         np.array([surface.distance_m for surface in state.surfaces]),
     )
     noise = _noise(model, sensor, values.weighting, surfaces)
-    sums = _empty_sums(len(slots.record_of), surfaces, features)
+    sums = _empty_sums(len(slots.record_of), surfaces, features, len(surface) if residuals else 0)
     if sensor == "laser":
         poses = _laser_poses(points, model, state, slice(first, first + len(errors.record)))
         sum_laser_points(of_points, poses, of_records, of_surfaces, noise, sums)
     else:
         sum_soundings(of_points, _sonar_poses(points, model, state), of_records, of_surfaces, noise, sums)
-    return SummedBatch(_interval_sums(slots, sums), sums.statistics)
+    return SummedBatch(
+        sums=_interval_sums(slots, sums),
+        statistics=sums.statistics,
+        points=points,
+        record=slots.record,
+        share=slots.share,
+        surface=surface,
+        observed=sums.observed,
+    )
 
 
 def _laser_places(points: Batch, model: ObservationModel, state: State) -> Array:
@@ -143,16 +166,17 @@ def _noise(model: ObservationModel, sensor: str, weighting: Weighting, surfaces:
     )
 
 
-def _empty_sums(slots: int, surfaces: int, features: int) -> Sums:
+def _empty_sums(slots: int, surfaces: int, features: int, observed: int) -> Sums:
     return Sums(
         statistics=np.zeros((surfaces, FIRST_BIN + len(BINS) - 1)),
-        means=np.zeros((slots, 2)),
+        means=np.zeros((surfaces, 2)),
         normal=np.zeros((slots, features, features)),
         swept=np.zeros((slots, N_MOVED, features)),
         swept_twice=np.zeros((slots, N_MOVED, N_MOVED)),
         right=np.zeros((slots, features)),
         right_swept=np.zeros((slots, N_MOVED)),
         scalars=np.zeros((slots, 3)),
+        observed=np.empty((len(OBSERVED), observed)),
     )
 
 
@@ -187,5 +211,5 @@ def _interval_sums(slots: _Slots, sums: Sums) -> IntervalSums:
         count=sums.scalars[:, 1],
         squared_count=sums.scalars[:, 2],
     )
-    used = sums.means[:, 0] > 0
+    used = sums.normal[:, 0, 0] > 0
     return intervals if used.all() else intervals.selected(np.flatnonzero(used))

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pipeline.adjustment.observation_model import ObservationModel
 from pipeline.artefacts.columns import ALL_PASSES
 from pipeline.artefacts.from_tables import laser_planes
+from pipeline.artefacts.streams import Mapper, serial
 from pipeline.maths.adjustment.body_motion import BodyMotion
 from pipeline.maths.adjustment.design_matrix import SensorSigmas
 from pipeline.maths.adjustment.drift_likelihood import EXACT, DriftPrior
@@ -90,12 +91,13 @@ class CalibrationProblem:
     """A calibration to be solved.
 
     model: turns points into observations, and its coarse state names the calibrated sensor; prior: prior information;
-    consider: a-priori errors of the fixed parameters.
+    consider: a-priori errors of the fixed parameters; mapper: spreads the elimination of the records' noise.
     """
 
     model: ObservationModel
     prior: PriorInformation
     consider: ConsiderErrors
+    mapper: Mapper = serial
 
 
 @dataclass(frozen=True)
@@ -104,7 +106,7 @@ class SessionData:
 
     target: the design; surfaces: the surface of each family, at which the adjustment starts; trajectory: recorded
     poses, target frame; laser_lever_arm_m (3,), body axes; noise: errors of the poses; drift: how well the
-    figures of their drift are known; as_built: the target as surveyed.
+    figures of their drift are known; as_built: the target as surveyed; mapper: of the problem.
     """
 
     target: TargetModel
@@ -114,6 +116,7 @@ class SessionData:
     noise: PoseNoise
     drift: DriftPrior
     as_built: SurveyedFaces
+    mapper: Mapper = serial
 
 
 def sonar_problem(session: SessionData, mount: Mounted, noise: Mapping[str, PointNoise]) -> CalibrationProblem:
@@ -161,7 +164,7 @@ def problem_at(
         sigmas={sensor: sensor_sigmas(settings) for sensor, settings in noise.items()},
         wet_heights_m=session.target.wet_heights_m,
     )
-    return CalibrationProblem(model, prior, ConsiderErrors(np.zeros(state.size)))
+    return CalibrationProblem(model, prior, ConsiderErrors(np.zeros(state.size)), session.mapper)
 
 
 def faces_on_surfaces(faces: Sequence[Face], state: State) -> Faces:

@@ -9,7 +9,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipeline.adjustment.iteration import MountAdjustment
-from pipeline.adjustment.observation_model import CurrentValues, ObservationModel, Observations
+from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
+from pipeline.adjustment.point_sums import SummedBatch, summed
 from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.adjustment.residual_tables import residual_sample, residuals_table, sampling_step
 from pipeline.artefacts.catalogue.results import PATTERNS
@@ -17,7 +18,7 @@ from pipeline.artefacts.streams import Batch, Stream, point_array
 from pipeline.config.pool import Adjust
 from pipeline.gps_time import NS
 from pipeline.maths.adjustment.design_matrix import FLATTEST
-from pipeline.maths.adjustment.interval_sums import N_MOVED, IntervalSums, merged
+from pipeline.maths.adjustment.interval_sums import IntervalSums, merged
 from pipeline.maths.adjustment.mean_tests import normal_deviates
 from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.pose_errors import drift_between_passes
@@ -105,14 +106,16 @@ def residual_statistics(
         step = sampling_step(adjustment.accumulation.observations(sensor))
         thinning = _Thinning(round(settings.moment_s * NS), step)
         pieces: dict[str, list[ResidualSums]] = {}
-        by_face = []
-        for sums_by_variable, face_sums, sample in stream.fold(
+        by_face, thinned = [], []
+        for sums_by_variable, face_sums, points in stream.fold(
             _batch, problem.model, sensor, adjustment.values, thinning
         ):
-            samples.append(sample)
+            thinned.append(points)
             by_face.append(face_sums)
             for variable, sums in sums_by_variable.items():
                 pieces.setdefault(variable, []).append(sums)
+        sample = {name: np.concatenate([points[name] for points in thinned]) for name in thinned[0]}
+        samples.append(residual_sample(problem.model, sensor, sample, adjustment.values))
         sums_by_face[sensor] = merged(by_face)
         for variable, parts in pieces.items():
             sums = merged_residual_sums(parts)
@@ -133,33 +136,30 @@ def residual_statistics(
 def _batch(
     batch: Batch, model: ObservationModel, sensor: str, values: CurrentValues, thinning: _Thinning
 ) -> tuple[dict[str, ResidualSums], IntervalSums, Batch]:
-    """Return the sums of one batch by variable, its sums by interval and face, and a sample of its residuals."""
-    observations, weighting = model.linearise(sensor, batch, values), values.weighting
-    robust, weight = weighting.weights(observations)
-    # weights without robust reduction: a bin with large residuals must show, not lose its weight
-    plain = weighting.plain_weights(observations)
-    normalised = np.where(robust > 0, np.abs(weighting.normalised(observations)), 0.0)
-    slot = observations.points["t_ns"] // thinning.slot_ns
+    """Return the sums of one batch by variable, its sums by interval and face, and a sample of its points."""
+    observed = summed(batch, model, sensor, values, residuals=True)
+    # plain weights, without robust reduction: a bin with large residuals must show, not lose its weight
+    v_m, plain, normalised, _ = observed.observed
+    slot = observed.points["t_ns"] // thinning.slot_ns
     sums = {}
-    face = observations.points["face"].astype(np.int64)
-    upright = np.flatnonzero(~np.array([surface.level for surface in values.state.surfaces])[observations.surface])
-    for variable, column in _variables(model, observations, values.state):
+    face = observed.points["face"].astype(np.int64)
+    upright = np.flatnonzero(~np.array([surface.level for surface in values.state.surfaces])[observed.surface])
+    for variable, column in _variables(model, sensor, observed, values.state):
         use = upright if variable == "height" else slice(None)
         residuals = BinnedResiduals(
-            first=(face if variable == "height" else observations.surface)[use],
+            first=(face if variable == "height" else observed.surface)[use],
             second=np.floor(column / WIDTHS.get(variable, 1.0)).astype(np.int64)[use],
             slot=slot[use],
             weight=plain[use],
-            v_m=observations.v_m[use],
+            v_m=v_m[use],
             normalised=normalised[use],
         )
         sums[variable] = residual_sums(residuals)
-    thinned = {name: column[:: thinning.step] for name, column in batch.items()}
-    return sums, observations.sums(weight, by_face=True), residual_sample(model, sensor, thinned, values)
+    return sums, observed.sums, {name: column[:: thinning.step] for name, column in batch.items()}
 
 
 def _variables(
-    model: ObservationModel, observations: Observations, state: State
+    model: ObservationModel, sensor: str, observed: SummedBatch, state: State
 ) -> Iterator[tuple[str, Array | Integers]]:
     """Yield each variable by which residuals are binned: its name, and its values (n,) for the points.
 
@@ -170,17 +170,16 @@ def _variables(
     A step at a height tells what disturbs a sensor near the water, or where a face ends. Each face is compared with
     itself, because faces end at different heights. On a level face the height is that of the drift; it has no test.
     """
-    sensor, batch = observations.sensor, observations.points
+    batch, (v_m, _, _, cosine) = observed.points, observed.observed
     own = point_array(batch, f"{sensor}_m")
-    range_m = np.linalg.norm(own, axis=1)
-    cosine = observations.features[N_MOVED]  # n · d
-    reached_m = range_m - observations.v_m / np.copysign(np.maximum(np.abs(cosine), FLATTEST), cosine)
+    range_m = np.sqrt(own[:, 0] ** 2 + own[:, 1] ** 2 + own[:, 2] ** 2)
+    reached_m = range_m - v_m / np.copysign(np.maximum(np.abs(cosine), FLATTEST), cosine)
     angle = np.degrees(np.arcsin(own[:, 2] / range_m) if sensor == "laser" else receive_angle(own))
     yield "pass", batch["pass"].astype(np.int64)
     yield "face", batch["face"].astype(np.int64)
     yield "angle", angle
     yield "distance", reached_m
-    yield "height", _heights(model, observations, state, reached_m / range_m)
+    yield "height", _heights(model, sensor, observed, state, reached_m / range_m)
     yield "time", batch["t_ns"] // NS
     if sensor == "mbes":
         yield "step", angle
@@ -188,21 +187,19 @@ def _variables(
             yield name, batch["ping"] % pings
 
 
-def _heights(model: ObservationModel, observations: Observations, state: State, share: Array) -> Array:
+def _heights(model: ObservationModel, sensor: str, observed: SummedBatch, state: State, share: Array) -> Array:
     """Return the heights (n,) m above the water of points on the rays, at a share (n,) of the measured range.
 
     The sensor's height between two records is linear in time here: to a millimetre, where a bin is a decimetre.
     """
-    points, body, record = observations.points, model.body, observations.record
-    is_calibrated = observations.sensor == state.calibrated
-    measured = model.points_in_target(points, state) if is_calibrated else point_array(points, "target_m")
-    lever_arm = body.lever_arm(observations.sensor, state)
-    before, after = (
-        body.trajectory.positions_m[at, 2] + body.trajectory.R_frame_from_body[at, 2] @ lever_arm
-        for at in (record, record + 1)
-    )
-    start = before + observations.share * (after - before)
-    return np.asarray(start + share * (measured[:, 2] - start) - model.wet_heights_m[1])
+    points, body, record = observed.points, model.body, observed.record
+    measured = model.points_in_target(points, state)[:, 2] if sensor == state.calibrated else points["z_target_m"]
+    lever_arm = body.lever_arm(sensor, state)
+    used = slice(int(record.min(initial=0)), int(record.max(initial=0)) + 2)
+    at_records = body.trajectory.positions_m[used, 2] + body.trajectory.R_frame_from_body[used, 2] @ lever_arm
+    before, after = (at_records[record - used.start + k] for k in (0, 1))
+    start = before + observed.share * (after - before)
+    return np.asarray(start + share * (measured - start) - model.wet_heights_m[1])
 
 
 def _row(variable: str, sensor: str, family: str, mean: BinMean) -> Row:

@@ -126,6 +126,7 @@ class Stream:
 
     parts: tuple[Part, ...]
     mapper: Mapper = serial
+    here: Mapper = serial  # spreads work on the memory of this process
 
     def batches(self) -> Iterator[Batch]:
         """Yield all rows in order, batch by batch, with one batch in memory."""

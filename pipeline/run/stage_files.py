@@ -80,7 +80,7 @@ class _Watched:
 
 def _stream(this: Run, parts: Sequence[Part]) -> Stream:
     watched = [_Watched(part, this) for part in parts] if this.workers.local else parts
-    return Stream(tuple(watched), this.workers.map)
+    return Stream(tuple(watched), this.workers.map, this.workers.here)
 
 
 def write_outputs(partial: Path, stage: ModuleType, outputs: Any) -> dict[str, int]:

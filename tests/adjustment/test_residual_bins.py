@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pipeline.adjustment.observation_model import Observations
 from pipeline.adjustment.residual_statistics import _variables
 
 WALL_M, SLANT = 4.02, np.radians(40.0)  # distance of the surface along the rays, and their incidence
@@ -25,11 +24,9 @@ def variables(sensor, measured, along, noise_m, start_m, calibrated="mbes"):
     points = {f"{axis}_target_m": measured[:, k] for k, axis in enumerate("xyz")}
     points |= {f"{axis}_{sensor}_m": np.linalg.norm(measured - start_m, axis=1) * (axis == "x") for axis in "xyz"}
     points |= dict.fromkeys(("pass", "face", "t_ns", "ping"), zero)
-    features = np.stack([one, 0 * one, 0 * one, along * one])
-    observations = Observations(
-        sensor=sensor, points=points, record=zero, share=one / 3, surface=zero, v_m=along * noise_m, mean_m=0 * one,
-        sigma_m=one, common_m=0 * one, edge_weight=one, features=features, slopes=features[1:],
-    )  # fmt: skip
+    observed = SimpleNamespace(
+        points=points, record=zero, share=one / 3, observed=np.stack([along * noise_m, one, one, along * one])
+    )
     positions = np.zeros((2, 3))
     positions[:, 2] = start_m[2] + np.array([-0.02, 0.04]) - (TURNS @ LEVER_ARM)[:, 2]
     body = SimpleNamespace(
@@ -37,7 +34,7 @@ def variables(sensor, measured, along, noise_m, start_m, calibrated="mbes"):
         lever_arm=lambda sensor, state: LEVER_ARM,
     )
     model = SimpleNamespace(body=body, wet_heights_m=(-4.0, WATER_M), points_in_target=lambda points, state: measured)
-    return dict(_variables(model, observations, SimpleNamespace(calibrated=calibrated)))
+    return dict(_variables(model, sensor, observed, SimpleNamespace(calibrated=calibrated)))
 
 
 @pytest.mark.parametrize("side", [-1, 1])  # of n · d: a face, or a bottom, whose family's normal is that of the tops

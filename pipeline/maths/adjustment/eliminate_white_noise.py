@@ -12,9 +12,9 @@ the normal equations too, and the Σ p v² that remains after least squares.
     vᵀ V⁻¹ v the last element's Schur complement, log det V = log det P⁻¹ + Σ log det of the eliminated blocks.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ from pipeline.maths.kernels.record_chain import add_intervals, add_records, elim
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-SIDE_BY_SIDE = 2000  # number of records that are eliminated together: 4 to 8 MB of blocks
+SIDE_BY_SIDE = 1000  # number of records that are eliminated together: 2 to 4 MB of blocks
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,12 @@ class ReducedGroups:
 
 
 def eliminate_white_noise(
-    sources: Sequence[IntervalSource], n_parameters: int, times: TimeAxis, white: Array, group: Integers
+    sources: Sequence[IntervalSource],
+    n_parameters: int,
+    times: TimeAxis,
+    white: Array,
+    group: Integers,
+    mapper: Callable[..., Iterable[Any]] = map,
 ) -> ReducedGroups:
     """Return the normal equations, with the white noise of single records eliminated span by span.
 
@@ -114,31 +119,71 @@ def eliminate_white_noise(
         Standard deviations of a record's noise, m and rad.
     group : (j,) array
         Number of the group of each span, from 0.
+    mapper : callable
+        Like ``map``; it may work in parallel.
     """
     knots = times.knots
     spans, groups = len(group), int(group.max(initial=0)) + 1
-    width = n_parameters + 2 * N_POSE + 1
-    rows, sides = slice(n_parameters, width - 1), [*range(n_parameters), width - 1]  # the knots; x and v
-    by_span, others = np.zeros((spans, 2 * N_POSE, width)), np.zeros((groups, n_parameters + 1, n_parameters + 1))
+    by_span = np.zeros((spans, 2 * N_POSE, n_parameters + 2 * N_POSE + 1))
+    others, log_determinant = np.zeros((groups, n_parameters + 1, n_parameters + 1)), np.zeros(groups)
     located = [(source, knots.interval_of(source.record)) for source in sources]
-    log_determinant = np.zeros(groups)
     seen = np.unique(np.concatenate([span for _, span in located]))  # spans with an interval; the others add nothing
     length = int((knots.record[seen + 1] - knots.record[seen]).max(initial=0)) + 1
     count = max(1, SIDE_BY_SIDE // length)
-    for start in range(0, len(seen), count):
-        together = seen[start : start + count]
-        chain = _RecordChain.empty(together, width, length if np.any(white > 0) else 0)
-        for source, span in located:
-            low, high = np.searchsorted(span, [together[0], together[-1] + 1])
-            if high > low:
-                chain.add(source.linearised(slice(int(low), int(high))), span[low:high], times)
-        of_blocks = chain.eliminate(white)
-        by_span[together] = chain.normal[:, rows]
-        for number in np.unique(group[together]).tolist():
-            inside = group[together] == number
-            log_determinant[number] += of_blocks[inside].sum()
-            others[number] += chain.normal[inside].sum(axis=0)[np.ix_(sides, sides)]
+    work = [
+        _SpansTogether(seen[start : start + count], located, times, white, length if np.any(white > 0) else 0)
+        for start in range(0, len(seen), count)
+    ]
+    for together, of_spans in zip(work, mapper(_SpansTogether.eliminated, work), strict=True):
+        x = of_spans.columns
+        inner, sides = slice(len(x), len(x) + 2 * N_POSE), [*range(len(x)), len(x) + 2 * N_POSE]  # the knots; x and v
+        y = np.r_[x, n_parameters + np.arange(2 * N_POSE + 1)]
+        by_span[np.ix_(together.spans, np.arange(2 * N_POSE), y)] = of_spans.normal[:, inner]
+        numbers, x_and_v = group[together.spans], np.r_[x, n_parameters]
+        for number in np.unique(numbers).tolist():
+            inside = numbers == number
+            log_determinant[number] += of_spans.log_determinant[inside].sum()
+            others[number][np.ix_(x_and_v, x_and_v)] += of_spans.normal[inside].sum(axis=0)[np.ix_(sides, sides)]
     return ReducedGroups(by_span, others, log_determinant, group)
+
+
+@dataclass(frozen=True)
+class _EliminatedSpans:
+    """Normal equations (j, y, y) of spans side by side; y = (x of ``columns``, knot before, knot after, v).
+
+    log_determinant (j,). In the rows of x and v the columns of the knots mean nothing.
+    """
+
+    columns: Integers
+    normal: Array
+    log_determinant: Array
+
+
+@dataclass(frozen=True)
+class _SpansTogether:
+    """Spans (j,), ascending, to be eliminated side by side; ``length``: most records in a span, 0 without white noise.
+
+    located: each source, and the span (g,) of each of its intervals.
+    """
+
+    spans: Integers
+    located: Sequence[tuple[IntervalSource, Integers]]
+    times: TimeAxis
+    white: Array
+    length: int
+
+    def eliminated(self) -> _EliminatedSpans:
+        """Return the normal equations without white noise, with the columns of parameters that these spans see."""
+        pieces = []
+        for source, span in self.located:
+            low, high = np.searchsorted(span, [self.spans[0], self.spans[-1] + 1])
+            if high > low:
+                pieces.append((source.linearised(slice(int(low), int(high))), span[low:high]))
+        columns = np.unique(np.concatenate([intervals.columns for intervals, _ in pieces]))
+        chain = _RecordChain.empty(self.spans, len(columns) + 2 * N_POSE + 1, self.length)
+        for intervals, span in pieces:
+            chain.add(replace(intervals, columns=np.searchsorted(columns, intervals.columns)), span, self.times)
+        return _EliminatedSpans(columns, chain.normal, chain.eliminate(self.white))
 
 
 @dataclass(frozen=True)
@@ -181,12 +226,9 @@ class _RecordChain:
 
     def eliminate(self, white: Array) -> Array:
         """Eliminate the white noise of the records from ``normal``, in place; return the spans' log det (j,)."""
-        count, length, _, width = self.border.shape
-        log_determinant = np.zeros(count)
-        if length:
-            eliminate_records(self.own, self.ahead, self.border, white, log_determinant)
-            lines = self.border.reshape(count, length * N_POSE, width)  # one product for all records of a span
-            self.normal[...] -= np.swapaxes(lines, 1, 2) @ lines
+        log_determinant = np.zeros(len(self.spans))
+        if self.own.shape[1]:
+            eliminate_records(self.own, self.ahead, self.border, white, self.normal, log_determinant)
         return log_determinant
 
 

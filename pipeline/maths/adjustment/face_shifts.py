@@ -79,7 +79,7 @@ def equations_with_faces(
     seen = np.unique(np.concatenate([sums.surface for sums in linearisation.sums.values()]))  # only these have a column
     together = np.zeros(len(drift.knots.inner), dtype=np.int64)
     sources = list(_by_face(linearisation, faces, seen))
-    reduced = eliminate_white_noise(sources, size + len(seen), times, noise.white, together)
+    reduced = eliminate_white_noise(sources, size + len(seen), times, noise.white, together, linearisation.mapper)
     equations = eliminate_drift(reduced.of([0]), noise, drift)
     count, places = size + len(faces.names), np.concatenate([np.arange(size), size + seen])
     normal, right = np.zeros((count, count)), np.zeros(count)

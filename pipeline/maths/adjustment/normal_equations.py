@@ -20,8 +20,9 @@ Order: points -> sums by interval (:mod:`~pipeline.maths.adjustment.interval_sum
 (:mod:`~pipeline.maths.adjustment.parameters`) -> solution (:mod:`~pipeline.maths.adjustment.solution`).
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,12 +53,16 @@ BLOCK = 50_000  # number of intervals whose designs are computed at a time
 
 @dataclass(frozen=True)
 class Linearisation:
-    """Interval sums by sensor, and the values at which their observations were taken."""
+    """Interval sums by sensor, and the values at which their observations were taken.
+
+    ``mapper``, like ``map``, spreads the elimination of the records' noise.
+    """
 
     sums: Mapping[str, IntervalSums]
     state: State
     body: BodyMotion
     drift: DriftEstimate | None = None
+    mapper: Callable[..., Iterable[Any]] = map
 
     def with_sums(self, sensor: str, sums: IntervalSums) -> "Linearisation":
         """Return this linearisation with other sums of one sensor."""
@@ -155,7 +160,8 @@ def reduced_by_group(
     """
     sources = list(linearisation.by_surface(selected))
     n_parameters = linearisation.state.size if selected is None else len(selected)
-    return eliminate_white_noise(sources, n_parameters, TimeAxis(linearisation.body.seconds, knots), white, group)
+    times = TimeAxis(linearisation.body.seconds, knots)
+    return eliminate_white_noise(sources, n_parameters, times, white, group, linearisation.mapper)
 
 
 def updated_sums(linearisation: Linearisation, step: Array, drift_step: DriftEstimate) -> dict[str, IntervalSums]:

@@ -18,12 +18,15 @@ bin's scatter is combined with the scatter of all slots of the surface, which ha
     c² = max(0, Σ ((S_m - P_m M)² - P_m) / Σ P_m²) over all bins of the surface, with 8 + n - 1 degrees of freedom.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+from pipeline.maths.kernels.compiled import block
+from pipeline.maths.kernels.residual_bins import add_residuals
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -69,33 +72,42 @@ def residual_sums(residuals: BinnedResiduals) -> ResidualSums:
     weight, v_m = residuals.weight, residuals.v_m
     if not len(v_m):
         return ResidualSums(np.empty((0, 3), dtype=np.int64), np.empty((0, 4)), np.empty(0))
-    columns = (residuals.first, residuals.second, residuals.slot)
-    lows = [int(column.min()) for column in columns]
-    spans = [int(column.max()) - low + 1 for column, low in zip(columns, lows, strict=True)]
-    code = np.ravel_multi_index([column - low for column, low in zip(columns, lows, strict=True)], spans)
+    code, lows, spans = _codes((residuals.first, residuals.second, residuals.slot))
     length = int(np.prod(spans))
     codes = np.arange(length)
     if length > SPARSE * len(code):
         codes, code = np.unique(code, return_inverse=True)
         length = len(codes)
-    count = np.bincount(code, minlength=length)
-    filled = np.flatnonzero(count)
-    parts = (np.bincount(code, weights=part, minlength=length)[filled] for part in (weight, weight * v_m, v_m**2))
-    p, pv, squares = parts
-    largest = np.zeros(length)
-    np.maximum.at(largest, code, residuals.normalised)
-    key = np.column_stack(np.unravel_index(codes[filled], spans)) + lows
-    return ResidualSums(key, np.column_stack([p, pv, count[filled], squares]), largest[filled])
+    sums, largest = np.zeros((length, 4)), np.zeros(length)
+    add_residuals(*map(block, (code, weight, v_m, residuals.normalised)), sums, largest)
+    filled = np.flatnonzero(sums[:, 2])
+    return ResidualSums(_keys(codes[filled], lows, spans), sums[filled], largest[filled])
 
 
 def merged_residual_sums(pieces: Iterable[ResidualSums]) -> ResidualSums:
     """Return the sums of all batches together, in order."""
-    parts = list(pieces)
-    keys, inverse = np.unique(np.concatenate([part.key for part in parts]), axis=0, return_inverse=True)
-    sums, largest = np.zeros((len(keys), 4)), np.zeros(len(keys))
-    np.add.at(sums, inverse.ravel(), np.concatenate([part.sums for part in parts]))
-    np.maximum.at(largest, inverse.ravel(), np.concatenate([part.largest for part in parts]))
-    return ResidualSums(keys.reshape(-1, 3), sums, largest)
+    parts = [part for part in pieces if len(part.key)]
+    if not parts:
+        return ResidualSums(np.empty((0, 3), dtype=np.int64), np.empty((0, 4)), np.empty(0))
+    code, lows, spans = _codes(np.concatenate([part.key for part in parts]).T)
+    order = np.argsort(code, kind="stable")
+    first = np.flatnonzero(np.diff(code[order], prepend=-1))
+    sums = np.add.reduceat(np.concatenate([part.sums for part in parts])[order], first)
+    largest = np.maximum.reduceat(np.concatenate([part.largest for part in parts])[order], first)
+    return ResidualSums(_keys(code[order[first]], lows, spans), sums, largest)
+
+
+def _codes(columns: Sequence[Integers] | Integers) -> tuple[Integers, list[int], list[int]]:
+    """Return one number (n,) for the three of each key, in their order, and the lowest and the span of each of them."""
+    lows = [int(column.min()) for column in columns]
+    spans = [int(column.max()) - low + 1 for column, low in zip(columns, lows, strict=True)]
+    shifted = [column - low for column, low in zip(columns, lows, strict=True)]
+    return (shifted[0] * spans[1] + shifted[1]) * spans[2] + shifted[2], lows, spans
+
+
+def _keys(codes: Integers, lows: Sequence[int], spans: Sequence[int]) -> Integers:
+    """Return the keys (m, 3) of these numbers (m,)."""
+    return np.column_stack(np.unravel_index(codes, spans)) + lows
 
 
 @dataclass(frozen=True)

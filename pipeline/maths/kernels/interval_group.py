@@ -19,7 +19,9 @@ Integers = NDArray[np.int64]
 LINE, MATRIX, CUBE, NUMBERS = float64[::1], float64[:, ::1], float64[:, :, ::1], int64[::1]
 N_MOVED = 3  # features on which a pose error acts
 COUNT, CUT, REDUCED, INFORMATION, FIRST_BIN = 0, 1, 2, 3, 4  # columns of the statistics of a surface
-V, WEIGHT, COMMON, EDGE, FEATURES = 0, 1, 2, 3, 4  # columns of ``kept``; slopes follow the features
+V, WEIGHT, COMMON, EDGE, PLAIN, SIZE, FEATURES = 0, 1, 2, 3, 4, 5, 6  # columns of ``kept``; slopes follow the features
+COSINE = FEATURES + 2  # of the angle between ray and normal, n · d
+OBSERVED = (V, PLAIN, SIZE, COSINE)  # columns of ``kept`` that are the rows of ``observed``
 
 
 class Points(NamedTuple):
@@ -74,9 +76,11 @@ class Noise(NamedTuple):
 class Sums(NamedTuple):
     """What is added to. g: number of slots; F: features q of the sensor.
 
-    statistics (s, 4 + bins): COUNT … FIRST_BIN; means (g, 2): Σ w, Σ w v; normal (g, F, F), swept (g, 3, F),
-    swept_twice (g, 3, 3), right (g, F), right_swept (g, 3): see :class:`pipeline.maths.adjustment.interval_sums.
-    IntervalSums`; scalars (g, 3): Σ w v², Σ e, Σ e².
+    statistics (s, 4 + bins): COUNT … FIRST_BIN; means (s, 2): Σ w, Σ w v of a group, scratch; normal (g, F, F),
+    swept (g, 3, F), swept_twice (g, 3, 3), right (g, F), right_swept (g, 3): see :class:`pipeline.maths.adjustment.
+    interval_sums.IntervalSums`; scalars (g, 3): Σ w v², Σ e, Σ e². Written: observed (4, n): of each point v, its
+    weight not reduced for a large residual, its normalised |v| (zero if the robust weight is zero) and COSINE; or
+    (4, 0): nothing.
     """
 
     statistics: Array
@@ -87,13 +91,14 @@ class Sums(NamedTuple):
     right: Array
     right_swept: Array
     scalars: Array
+    observed: Array
 
 
 POINTS = named(Points, MATRIX, LINE, NUMBERS, LINE, NUMBERS, LINE, NUMBERS)
 RECORDS = named(Records, MATRIX, CUBE)
 SURFACES = named(Surfaces, CUBE, LINE)
 NOISE = named(Noise, LINE, LINE, LINE, float64, float64, LINE, float64, float64, float64)
-SUMS = named(Sums, MATRIX, MATRIX, CUBE, CUBE, CUBE, MATRIX, MATRIX, MATRIX)
+SUMS = named(Sums, MATRIX, MATRIX, CUBE, CUBE, CUBE, MATRIX, MATRIX, MATRIX, MATRIX)
 
 
 @compiled()
@@ -171,7 +176,9 @@ def weigh(row: Array, variance: float, surface: int, noise: Noise, statistics: A
         of_surface[INFORMATION] += row[EDGE]
     bins = len(of_surface) - FIRST_BIN
     of_surface[FIRST_BIN + min(int(min(abs(normalised) / noise.bin_width, 1e9)), bins - 1)] += 1.0
-    row[WEIGHT] = robust * row[EDGE] / (scaled * noise.edge_share[surface])
+    row[PLAIN] = row[EDGE] / (scaled * noise.edge_share[surface])
+    row[WEIGHT] = robust * row[PLAIN]
+    row[SIZE] = abs(normalised) if robust > 0.0 else 0.0
 
 
 @compiled()
@@ -197,17 +204,25 @@ def _add_point(q: Array, v: float, s: float, w: float, g: int, sums: Sums) -> No
 def add_group(first: int, end: int, points: Points, kept: Array, q: Array, sums: Sums) -> None:
     """Add the points first to end to the sums of their slots, with the features at the adjusted points.
 
-    ``q`` (F,): scratch. The weighted means of the whole group are in ``sums`` already.
+    ``q`` (F,): scratch.
     """
     features = len(q)
+    sums.means[:] = 0.0
     for p in range(first, end):
-        row = kept[p - first]
+        row, mean = kept[p - first], sums.means[points.surface[p]]
+        mean[0] += row[WEIGHT]
+        mean[1] += row[WEIGHT] * row[V]
+        if sums.observed.shape[1]:
+            for k in range(len(OBSERVED)):
+                sums.observed[k, p] = row[OBSERVED[k]]
+    for p in range(first, end):
+        row, mean = kept[p - first], sums.means[points.surface[p]]
         w, v = row[WEIGHT], row[V]
         if w <= 0.0:
             continue
         g = points.slot[p]
-        information = row[COMMON] * sums.means[g, 0]
-        noise = v - information / (1.0 + information) * (sums.means[g, 1] / sums.means[g, 0])
+        information = row[COMMON] * mean[0]
+        noise = v - information / (1.0 + information) * (mean[1] / mean[0])
         q[0] = 1.0
         for f in range(1, features):
             q[f] = row[FEATURES + f - 1] - row[FEATURES + features + f - 2] * noise

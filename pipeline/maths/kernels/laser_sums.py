@@ -13,6 +13,7 @@ from pipeline.maths.adjustment.design_matrix import AT_45_DEG
 from pipeline.maths.kernels.compiled import compiled, named
 from pipeline.maths.kernels.interval_group import (
     COMMON,
+    COSINE,
     EDGE,
     FEATURES,
     LINE,
@@ -22,7 +23,6 @@ from pipeline.maths.kernels.interval_group import (
     RECORDS,
     SUMS,
     SURFACES,
-    WEIGHT,
     Noise,
     Points,
     Records,
@@ -86,15 +86,13 @@ def sum_laser_points(
             away = ray[2] * (noise.range_m**2 - across)
             variance = away * ray[2] + across
             turning = across / range_m * (1 - ray[2] * ray[2])
-            row[V], row[EDGE], row[FEATURES + 2] = v, points.edge[p], ray[2]
+            row[V], row[EDGE], row[COSINE] = v, points.edge[p], ray[2]
             row[FEATURES + 3] = (np.sign(ray[2]) - ray[2]) / AT_45_DEG
             row[SLOPES], row[SLOPES + 1] = away * ray[0] / variance, away * ray[1] / variance
             row[SLOPES + 2], row[SLOPES + 3] = turning / variance, -turning / AT_45_DEG / variance
             turn_features(row, r, records, k, A, s)
             row[COMMON] = common_variance(A, row[FEATURES], row[FEATURES + 1], share, noise.white)
             weigh(row, variance, s, noise, sums.statistics)
-            sums.means[points.slot[p], 0] += row[WEIGHT]
-            sums.means[points.slot[p], 1] += row[WEIGHT] * row[V]
         add_group(first, end, points, kept, q, sums)
         first = end
     mirror(sums)

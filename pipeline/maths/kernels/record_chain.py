@@ -193,13 +193,27 @@ def _less_product(left: Array, right: Array, lines: Array) -> None:
                 lines[p, column] -= left[k, p] * right[k, column]
 
 
-@compiled((BLOCKS, BLOCKS, BLOCKS, LINE, LINE))
-def eliminate_records(own: Array, ahead: Array, border: Array, white: Array, log_determinant: Array) -> None:
+@compiled()
+def _less_square(lines: Array, sums: Array) -> None:
+    """Take linesᵀ lines of ``lines`` (6, y) away from ``sums`` (y, y)."""
+    for p in range(len(sums)):
+        of_row = sums[p]
+        a, b, c, d, e, f = lines[0, p], lines[1, p], lines[2, p], lines[3, p], lines[4, p], lines[5, p]
+        for q in range(len(sums)):
+            of_row[q] -= (
+                a * lines[0, q] + b * lines[1, q] + c * lines[2, q] + d * lines[3, q] + e * lines[4, q] + f * lines[5, q]
+            )
+
+
+@compiled((BLOCKS, BLOCKS, BLOCKS, LINE, MATRICES, LINE))
+def eliminate_records(
+    own: Array, ahead: Array, border: Array, white: Array, sums: Array, log_determinant: Array
+) -> None:  # fmt: skip
     """Eliminate the records of each span, one after the other (block Cholesky); write the spans' log det (j,).
 
-    With the factors L of the blocks A that remain, A = L Lᵀ, the rows L⁻¹ B take the place of the border's B. Then what
-    the records leave of the normal equations of y is N - Σ (L⁻¹ B)ᵀ L⁻¹ B. Blocks are overwritten. A record that no
-    interval touches has A = I and B = 0.
+    With the factors L of the blocks A that remain, A = L Lᵀ, and L⁻¹ B in the place of the border's B, the records
+    leave N - Σ (L⁻¹ B)ᵀ L⁻¹ B of the normal equations N of y. Blocks are overwritten. A record that no interval touches
+    has A = I and B = 0.
 
     Parameters
     ----------
@@ -207,6 +221,8 @@ def eliminate_records(own: Array, ahead: Array, border: Array, white: Array, log
         Blocks by unscaled noise.
     white : (6,) array
         Standard deviations of a record's noise, m and rad.
+    sums : (j, y, y) array
+        The spans' normal equations N, reduced in place.
     """
     spans, length = own.shape[:2]
     for j in range(spans):
@@ -221,12 +237,14 @@ def eliminate_records(own: Array, ahead: Array, border: Array, white: Array, log
                     block[p, q] *= white[p] * white[q]
                     following[p, q] *= white[p] * white[q]
                 block[p, p] += 1.0
-                lines[p] *= white[p]
+                for column in range(lines.shape[1]):
+                    lines[p, column] *= white[p]
             if linked:  # what the record before leaves
                 _less_product(ahead[j, k - 1], ahead[j, k - 1], block)
                 _less_product(ahead[j, k - 1], border[j, k - 1], lines)
             log_determinant[j] += _factorised(block)
             _substituted(block, lines)
+            _less_square(lines, sums[j])
             linked = bool(np.any(following != 0.0))
             if linked:
                 _substituted(block, following)

@@ -13,6 +13,7 @@ from pipeline.maths.adjustment.design_matrix import AT_45_DEG, FLATTEST, FLATTES
 from pipeline.maths.kernels.compiled import compiled, named
 from pipeline.maths.kernels.interval_group import (
     COMMON,
+    COSINE,
     CUBE,
     EDGE,
     FEATURES,
@@ -24,7 +25,6 @@ from pipeline.maths.kernels.interval_group import (
     RECORDS,
     SUMS,
     SURFACES,
-    WEIGHT,
     Noise,
     Points,
     Records,
@@ -127,7 +127,7 @@ def _observe(
     speed = steering + ray[2] * range_m
     gradient = (up_of_normal - 2 * up_of_ray * ray[2]) * range_m**2 / (2 * SPEED_M_S)
     projector = ray[2] / (2 * range_m)
-    row[FEATURES + 2] = ray[2]
+    row[COSINE] = ray[2]
     row[FEATURES + 3], row[FEATURES + 4], row[FEATURES + 5] = speed, gradient, steering
     row[FEATURES + 6], row[FEATURES + 7], row[FEATURES + 8] = projector * x, projector * y, projector * z
     row[FEATURES + 9] = (np.sign(ray[2]) - ray[2]) / AT_45_DEG
@@ -162,8 +162,6 @@ def sum_soundings(
                 surfaces.axes[s], row[FEATURES], row[FEATURES + 1], points.share[p], noise.white
             )
             weigh(row, variance, s, noise, sums.statistics)
-            sums.means[points.slot[p], 0] += row[WEIGHT]
-            sums.means[points.slot[p], 1] += row[WEIGHT] * row[V]
         add_group(first, end, points, kept, q, sums)
         first = end
     mirror(sums)

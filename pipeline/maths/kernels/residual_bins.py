@@ -1,0 +1,35 @@
+"""Sums of residuals by bin and slot of time, as :func:`pipeline.maths.adjustment.residual_means.residual_sums` says."""
+
+import numpy as np
+from numba import float64, int64
+from numpy.typing import NDArray
+
+from pipeline.maths.kernels.compiled import compiled
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+LINE, MATRIX, NUMBERS = float64[::1], float64[:, ::1], int64[::1]
+
+
+@compiled((NUMBERS, LINE, LINE, LINE, MATRIX, LINE))
+def add_residuals(
+    code: Integers, weight: Array, v_m: Array, normalised: Array, sums: Array, largest: Array
+) -> None:
+    """Add residuals to the sums of their bins.
+
+    Parameters
+    ----------
+    code : (n,) array
+        The row of each residual in ``sums``.
+    weight, v_m, normalised : (n,) arrays
+        Weights p, residuals v, and their sizes |v| / σ.
+    sums, largest : (m, 4) and (m,) arrays
+        Added to: Σ p, Σ p v, number of points, Σ v²; the largest size.
+    """
+    for i in range(len(code)):
+        row = sums[code[i]]
+        row[0] += weight[i]
+        row[1] += weight[i] * v_m[i]
+        row[2] += 1.0
+        row[3] += v_m[i] * v_m[i]
+        largest[code[i]] = max(largest[code[i]], normalised[i])
