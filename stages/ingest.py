@@ -178,7 +178,7 @@ def _one_a_second(t_ns: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return the first time (ns) within each second, and the last of all times."""
     if not len(t_ns):
         return t_ns
-    ordered = np.sort(t_ns)
+    ordered = t_ns if np.all(t_ns[1:] >= t_ns[:-1]) else np.sort(t_ns)
     first = np.flatnonzero(np.diff(ordered // NS, prepend=-1))
     return np.append(ordered[first], ordered[-1])
 

@@ -31,7 +31,7 @@ class SummedBatch:
     """Sums of the intervals (not ordered), and of each surface (s, 4 + bins) the columns of ``interval_group``.
 
     points: the batch in order of time; record, share (n,): INS record before each, and place from there to the next;
-    surface (n,): its surface; observed (4, n): rows of ``interval_group.OBSERVED``, or (4, 0).
+    surface (n,): its surface; observed (6, n): rows of ``interval_group.OBSERVED``, or (6, 0).
     """
 
     sums: IntervalSums

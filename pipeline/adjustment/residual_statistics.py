@@ -106,16 +106,14 @@ def residual_statistics(
         step = sampling_step(adjustment.accumulation.observations(sensor))
         thinning = _Thinning(round(settings.moment_s * NS), step)
         pieces: dict[str, list[ResidualSums]] = {}
-        by_face, thinned = [], []
-        for sums_by_variable, face_sums, points in stream.fold(
+        by_face = []
+        for sums_by_variable, face_sums, sample in stream.fold(
             _batch, problem.model, sensor, adjustment.values, thinning
         ):
-            thinned.append(points)
+            samples.append(sample)
             by_face.append(face_sums)
             for variable, sums in sums_by_variable.items():
                 pieces.setdefault(variable, []).append(sums)
-        sample = {name: np.concatenate([points[name] for points in thinned]) for name in thinned[0]}
-        samples.append(residual_sample(problem.model, sensor, sample, adjustment.values))
         sums_by_face[sensor] = merged(by_face)
         for variable, parts in pieces.items():
             sums = merged_residual_sums(parts)
@@ -136,10 +134,10 @@ def residual_statistics(
 def _batch(
     batch: Batch, model: ObservationModel, sensor: str, values: CurrentValues, thinning: _Thinning
 ) -> tuple[dict[str, ResidualSums], IntervalSums, Batch]:
-    """Return the sums of one batch by variable, its sums by interval and face, and a sample of its points."""
+    """Return the sums of one batch by variable, its sums by interval and face, and a sample of its residuals."""
     observed = summed(batch, model, sensor, values, residuals=True)
     # plain weights, without robust reduction: a bin with large residuals must show, not lose its weight
-    v_m, plain, normalised, _ = observed.observed
+    v_m, _, _, plain, normalised, _ = observed.observed
     slot = observed.points["t_ns"] // thinning.slot_ns
     sums = {}
     face = observed.points["face"].astype(np.int64)
@@ -155,7 +153,7 @@ def _batch(
             normalised=normalised[use],
         )
         sums[variable] = residual_sums(residuals)
-    return sums, observed.sums, {name: column[:: thinning.step] for name, column in batch.items()}
+    return sums, observed.sums, residual_sample(model, sensor, observed, values.state, thinning.step)
 
 
 def _variables(
@@ -170,7 +168,7 @@ def _variables(
     A step at a height tells what disturbs a sensor near the water, or where a face ends. Each face is compared with
     itself, because faces end at different heights. On a level face the height is that of the drift; it has no test.
     """
-    batch, (v_m, _, _, cosine) = observed.points, observed.observed
+    batch, v_m, cosine = observed.points, observed.observed[0], observed.observed[-1]
     own = point_array(batch, f"{sensor}_m")
     range_m = np.sqrt(own[:, 0] ** 2 + own[:, 1] ** 2 + own[:, 2] ** 2)
     reached_m = range_m - v_m / np.copysign(np.maximum(np.abs(cosine), FLATTEST), cosine)

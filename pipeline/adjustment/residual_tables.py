@@ -1,22 +1,24 @@
 """Tables of the residuals' sample: the sample, its means along one variable, and by grid cell of each face."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
+from pipeline.adjustment.observation_model import ObservationModel
+from pipeline.adjustment.point_sums import SummedBatch
 from pipeline.artefacts.catalogue.results import RESIDUALS
 from pipeline.artefacts.columns import ALL_PASSES
 from pipeline.artefacts.from_tables import normal_of
 from pipeline.artefacts.streams import Batch, point_array
 from pipeline.gps_time import NS
+from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.geometry.face_grid import BinStatistics, bin_statistics, cell_centres, cells_on_face
 from pipeline.maths.sonar.soundings import receive_angle
 
+Array = NDArray[np.float64]
 SENSORS = ("laser", "mbes")
 WIDTHS = {"angle": 2.0, "range": 0.5, "time": 1.0}  # of bins: degrees, m, s
 CELL_M = 0.1
@@ -98,7 +100,7 @@ def sampling_step(total: int, at_most: int = AT_MOST) -> int:
     return step if step <= 1 else step | 1
 
 
-def residual_sample(model: ObservationModel, sensor: str, batch: Batch, values: CurrentValues) -> Batch:
+def residual_sample(model: ObservationModel, sensor: str, observed: SummedBatch, state: State, step: int) -> Batch:
     """Return columns of table ``residuals``: positions and residuals with the calibrated and with the coarse mount.
 
     Parameters
@@ -107,36 +109,40 @@ def residual_sample(model: ObservationModel, sensor: str, batch: Batch, values: 
         Model that turns points into observations.
     sensor : {"laser", "mbes"}
         The sensor that observed the points.
-    batch : Batch
-        Columns of labelled points.
-    values : CurrentValues
+    observed : SummedBatch
+        Labelled points with their residuals.
+    state : State
         The adjusted values.
+    step : int
+        Every ``step``-th point is in the sample.
     """
-    state, weighting = values.state, values.weighting
-    numbered = {**batch, "row": np.arange(len(batch["t_ns"]))}
-    observations = model.linearise(sensor, numbered, values)
-    points = observations.points
+    points = {name: column[::step] for name, column in observed.points.items()}
+    v_m, mean_m, robust, *_ = observed.observed[:, ::step]
     own = point_array(points, f"{sensor}_m")
     ranges = np.linalg.norm(own, axis=1)
     angle = receive_angle(own) if sensor == "mbes" else np.arcsin(own[:, 2] / ranges)
     if sensor != state.calibrated:
         positions = coarse_positions = point_array(points, "target_m")
-        coarse_residual = observations.v_m
+        coarse_residual = v_m
     else:
-        coarse = replace(model.coarse, surfaces=state.surfaces)
-        positions, coarse_positions = model.points_in_target(points, state), model.points_in_target(points, coarse)
-        before = model.linearise(sensor, points, CurrentValues(coarse))
-        coarse_residual = before.v_m + before.mean_m
+        positions, coarse_positions = (model.points_in_target(points, at) for at in (state, model.coarse))
+        coarse_residual = _distances(model, points["face"], coarse_positions, state)
     columns = {f"{axis}_target_m": positions[:, k] for k, axis in enumerate("xyz")}
     columns |= {f"coarse_{axis}_target_m": coarse_positions[:, k] for k, axis in enumerate("xyz")}
     columns |= {"range_m": ranges, "angle_deg": np.degrees(angle)}
-    columns |= {"residual_m": observations.v_m + observations.mean_m, "coarse_residual_m": coarse_residual}
-    columns |= {"weight": weighting.weights(observations)[0]}
+    columns |= {"residual_m": v_m + mean_m, "coarse_residual_m": coarse_residual, "weight": robust}
     single = {name: column.astype(np.float32) for name, column in columns.items()}
-    sensors = np.full(len(observations.v_m), sensor, dtype=object)
-    sample = {"sensor": sensors} | {name: points[name] for name in ("t_ns", "pass", "face")} | single
-    in_order = np.argsort(points["row"])
-    return {name: column[in_order] for name, column in sample.items()}
+    sensors = np.full(len(v_m), sensor, dtype=object)
+    return {"sensor": sensors} | {name: points[name] for name in ("t_ns", "pass", "face")} | single
+
+
+def _distances(model: ObservationModel, face: NDArray[np.int16], positions_m: Array, state: State) -> Array:
+    """Return the distances (n,) m of points (n, 3) from the surfaces of the state, along their normals."""
+    surface = model.faces.surface[face]
+    normals = np.array([each.normal for each in state.surfaces])
+    away = np.einsum("ni,ni->n", positions_m, normals[surface])
+    distances_m = np.array([each.distance_m for each in state.surfaces])
+    return np.asarray(away - distances_m[surface] - model.height_of_face[face])
 
 
 def residuals_table(pieces: Sequence[Batch]) -> pd.DataFrame:

@@ -1,9 +1,10 @@
 """Run native decoders in a process of their own, because a damaged file may end that process without an exception.
 
 The process (the worker) writes to its standard output in native byte order. For each batch it writes the number of rows
-n as int64, and then the columns one after another, each as n float64. A number 0 ends the output. To report an error it
-writes -1, the length of a message as int64, and the message in UTF-8. A worker may write one text in place of batches:
-its length as int64, and the text in UTF-8. Any other output, or none, raises a RawDataError of the file.
+n as int64, and then the rows: n records of the same size, or the columns one after another, each as n float64. A number
+0 ends the output. To report an error it writes -1, the length of a message as int64, and the message in UTF-8. A worker
+may write one text in place of batches: its length as int64, and the text in UTF-8. Any other output, or none, raises a
+RawDataError of the file.
 """
 
 import struct
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 from pipeline.errors import RawDataError
 
 REMEDY = "copy or export it again"
+PIPE_BYTES = 1 << 20  # as much as Linux allows: both processes wait for each other less often
 DecodedColumns = tuple[NDArray[np.float64], ...]
 
 
@@ -48,10 +50,23 @@ def decoded_batches(program: Path, arguments: list[str], name: str, width: int, 
     RawDataError
         The file is damaged: the worker reports an error, or ends without the final count.
     """
+    for data in decoded_records(program, arguments, name, width * 8, batch):
+        yield tuple(np.frombuffer(data, np.float64).reshape(width, -1))
+
+
+def decoded_records(program: Path, arguments: list[str], name: str, size: int, batch: int) -> Iterator[bytes]:
+    """Yield the records that a worker decodes, batch by batch.
+
+    Parameters
+    ----------
+    program, arguments, name, batch
+        As for :func:`decoded_batches`.
+    size : int
+        Bytes of a record.
+    """
     with _started(program, arguments) as stream:
         while count := _count(stream, name, batch):
-            numbers = np.frombuffer(_exactly(stream, width * 8 * count, name), np.float64)
-            yield tuple(numbers.reshape(width, count))
+            yield _exactly(stream, size * count, name)
 
 
 def decoded_text(program: Path, arguments: list[str], name: str, most: int) -> str:
@@ -72,7 +87,7 @@ def decoded_text(program: Path, arguments: list[str], name: str, most: int) -> s
 def _started(program: Path, arguments: list[str]) -> Iterator[IO[bytes]]:
     command = [sys.executable, "-P", str(program), *arguments]
     with subprocess.Popen(
-        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, pipesize=PIPE_BYTES
     ) as worker:
         try:
             assert worker.stdout is not None

@@ -15,11 +15,10 @@ import numpy as np
 
 from pipeline.config.recording import LasTime
 from pipeline.errors import RawDataError
-from pipeline.readers.laz import LazTables, max_point_count
+from pipeline.readers.laz import TIME_AT, LazTables, max_point_count
 from pipeline.readers.raw_file import opened, read_at, size_of
 
 MAX_OFFSET = 1 << 26
-TIMED_FORMATS = frozenset({1, 3, 4, 5, 6, 7, 8, 9, 10})
 _RECORD_LENGTHS = (20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67)  # bytes at least, by point format
 
 
@@ -70,7 +69,7 @@ def read_header(path: Path, name: str, declared_time: LasTime = None, timed: boo
         sound = sound and 54 * records <= offset - header_size
         if not sound or not all(np.isfinite(scale) and scale > 0 for scale in scales):
             raise RawDataError(f"{name}: its LAS header is damaged, or cut off; copy or export it again")
-        if timed and point_format not in TIMED_FORMATS:
+        if timed and point_format not in TIME_AT:
             raise RawDataError(
                 f"{name}: its point format {point_format} has no GPS time; export it again in point format 1, 3 or 6 "
                 "to 10"
@@ -80,7 +79,7 @@ def read_header(path: Path, name: str, declared_time: LasTime = None, timed: boo
         if compressed:
             present = max_point_count(file, name, LazTables(records, header_size, offset, size))
             first = offset + 8
-        time_at = first + (22 if point_format >= 6 else 20)
+        time_at = first + TIME_AT.get(point_format, 0)
         (first_s,) = struct.unpack("<d", read_at(file, time_at, 8).ljust(8, b"\0"))
         present = min(claimed, present)
         adjusted = declared_time == "adjusted_standard" if declared_time else bool(encoding & 1)

@@ -3,7 +3,8 @@
 The layout is that of the LASzip specification, little-endian. Offsets in the LASzip record (user "laszip encoded",
 number 22204): 12 u32 points per chunk, 32 u16 number of items. Then come u16 type, u16 size, u16 version of each item.
 The point data begin with i64 byte at which the table of chunks begins (u32 version, u32 number of chunks, ...). Then
-come the chunks. Each chunk begins with its first point in the form of LAS.
+come the chunks. Each chunk begins with its first point in the form of LAS: i32 x, y, z, as multiples of the scales from
+the offsets in the header (131 f64 x 3 and 155 f64 x 3), and f64 GPS time.
 """
 
 import struct
@@ -12,12 +13,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
+import numpy as np
+
 from pipeline.errors import RawDataError
-from pipeline.readers.decoder_process import REMEDY, DecodedColumns, decoded_batches
-from pipeline.readers.raw_file import read_at
+from pipeline.readers.decoder_process import REMEDY, DecodedColumns, decoded_records
+from pipeline.readers.raw_file import opened, read_at
 
 LAZ_WORKER = Path(__file__).with_name("laz_worker.py")
 VLR_HEAD = 54
+TIME_AT = {**dict.fromkeys((1, 3, 4, 5), 20), **dict.fromkeys((6, 7, 8, 9, 10), 22)}  # byte in a point, by its format
 _VARIABLE = 0xFFFFFFFF  # points per chunk if the chunks have different lengths
 MAX_POINTS_PER_BYTE = 1024  # LASzip reaches this if all points are the same
 MAX_CHUNK_POINTS = 10_000_000  # LASzip's own is 50,000
@@ -65,26 +69,41 @@ def max_point_count(file: BinaryIO, name: str, tables: LazTables) -> int:
 
 def _chunk_points(file: BinaryIO, tables: LazTables) -> int | None:
     """Return the number of points per chunk from the LASzip record; None if the record is missing or damaged."""
-    start = tables.header_size
-    for _ in range(min(tables.records, 65_536)):
+    at, length = _laszip_record(file, tables.header_size, tables.records)
+    if not length:
+        return None
+    (points,) = struct.unpack("<I", read_at(file, at + 12, 4))
+    return int(points) if 0 < points <= MAX_CHUNK_POINTS or points == _VARIABLE else None
+
+
+def _laszip_record(file: BinaryIO, start: int, records: int) -> tuple[int, int]:
+    """Return the byte at which the LASzip record begins, behind its head, and its length; 0, 0: there is none.
+
+    Parameters
+    ----------
+    file : BinaryIO
+        The LAZ file.
+    start, records : int
+        The byte at which the variable-length records begin, and their number.
+    """
+    for _ in range(min(records, 65_536)):
         head = read_at(file, start, VLR_HEAD + 16)
         if len(head) < VLR_HEAD + 16:
-            return None
+            break
         number, length = struct.unpack_from("<HH", head, 18)
         if head[2:18].rstrip(b"\0") == b"laszip encoded" and number == 22204 and length >= 34:
-            (points,) = struct.unpack_from("<I", head, VLR_HEAD + 12)
-            return int(points) if 0 < points <= MAX_CHUNK_POINTS or points == _VARIABLE else None
+            return start + VLR_HEAD, length
         start += VLR_HEAD + length
-    return None
+    return 0, 0
 
 
 def decompressed_points(path: Path, name: str, start: int, stop: int, batch: int) -> Iterator[DecodedColumns]:
-    """Return an iterator over batches of GPS time, x, y, z of points ``start`` to ``stop``, or to the file's end.
+    """Yield GPS time (0 without one), x, y, z of points ``start`` to ``stop``, batch by batch.
 
     Parameters
     ----------
     path : Path
-        The LAZ file.
+        The LAZ file, whose header has been checked.
     name : str
         Its path in the session folder, for messages.
     start, stop : int
@@ -97,4 +116,19 @@ def decompressed_points(path: Path, name: str, start: int, stop: int, batch: int
     RawDataError
         The file is damaged.
     """
-    return decoded_batches(LAZ_WORKER, [str(path), str(start), str(stop), str(batch)], name, 4, batch)
+    with opened(path, name) as file:
+        head = read_at(file, 0, 227)
+        header_size, points, records, point_format, size = struct.unpack_from("<HIIBH", head, 94)
+        record, length = _laszip_record(file, header_size, records)
+    scales, offsets = struct.unpack_from("<3d", head, 131), struct.unpack_from("<3d", head, 155)
+    fields: dict[str, tuple[str, int]] = {"x": ("<i4", 0), "y": ("<i4", 4), "z": ("<i4", 8)}
+    if point_format & 0x3F in TIME_AT:
+        fields["time"] = "<f8", TIME_AT[point_format & 0x3F]
+    formats, places = zip(*fields.values(), strict=True)
+    layout = np.dtype({"names": list(fields), "formats": formats, "offsets": places, "itemsize": size})
+    numbers = [str(number) for number in (start, stop, batch, size, points, record, length)]
+    for data in decoded_records(LAZ_WORKER, [str(path), *numbers], name, size, batch):
+        rows = np.frombuffer(data, layout)
+        times = rows["time"].astype(np.float64) if "time" in fields else np.zeros(len(rows))
+        places_m = zip("xyz", scales, offsets, strict=True)
+        yield times, *(rows[axis] * scale + offset for axis, scale, offset in places_m)

@@ -89,6 +89,14 @@ def test_layer_that_claims_gigabytes(content: bytes, tmp_path: Path) -> None:
         read(tmp_path / "a.laz", content[:at] + b"\xff\xff\xff\xf0" * 9 + content[at + 36 :])
 
 
+def test_header_and_laszip_record_that_disagree_on_the_size_of_a_point(content: bytes, tmp_path: Path) -> None:
+    """Else each point would be read from the bytes of its neighbour."""
+    (size,) = struct.unpack_from("<H", content, 105)
+    data = content[:105] + struct.pack("<H", size + 2) + content[107:]
+    with pytest.raises(RawDataError, match=r"a\.laz: is damaged.*another size"):
+        read(tmp_path / "a.laz", data)
+
+
 def test_header_that_claims_more_points(content: bytes, tmp_path: Path) -> None:
     """Not more parts than the chunks have room for."""
     data = content[:247] + struct.pack("<Q", 2**60) + content[255:]

@@ -7,10 +7,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.maths.kernels.labels import MOST_SLANTED
 from pipeline.maths.target.beams import TargetBeams
 from pipeline.maths.target.face import Face
 from pipeline.maths.target.face_tables import ROUNDING_M
-from pipeline.maths.kernels.labels import MOST_SLANTED
 from pipeline.maths.target.labelling import NO_FACE, Labels, LabelSettings
 from pipeline.maths.target.model import TargetModel
 

@@ -74,14 +74,14 @@ def residual_sums(residuals: BinnedResiduals) -> ResidualSums:
         return ResidualSums(np.empty((0, 3), dtype=np.int64), np.empty((0, 4)), np.empty(0))
     code, lows, spans = _codes((residuals.first, residuals.second, residuals.slot))
     length = int(np.prod(spans))
-    codes = np.arange(length)
+    codes = None
     if length > SPARSE * len(code):
         codes, code = np.unique(code, return_inverse=True)
         length = len(codes)
     sums, largest = np.zeros((length, 4)), np.zeros(length)
-    add_residuals(*map(block, (code, weight, v_m, residuals.normalised)), sums, largest)
+    add_residuals(block(code), block(weight), block(v_m), block(residuals.normalised), sums, largest)
     filled = np.flatnonzero(sums[:, 2])
-    return ResidualSums(_keys(codes[filled], lows, spans), sums[filled], largest[filled])
+    return ResidualSums(_keys(filled if codes is None else codes[filled], lows, spans), sums[filled], largest[filled])
 
 
 def merged_residual_sums(pieces: Iterable[ResidualSums]) -> ResidualSums:

@@ -19,9 +19,10 @@ Integers = NDArray[np.int64]
 LINE, MATRIX, CUBE, NUMBERS = float64[::1], float64[:, ::1], float64[:, :, ::1], int64[::1]
 N_MOVED = 3  # features on which a pose error acts
 COUNT, CUT, REDUCED, INFORMATION, FIRST_BIN = 0, 1, 2, 3, 4  # columns of the statistics of a surface
-V, WEIGHT, COMMON, EDGE, PLAIN, SIZE, FEATURES = 0, 1, 2, 3, 4, 5, 6  # columns of ``kept``; slopes follow the features
+V, WEIGHT, COMMON, EDGE, MEAN, ROBUST, PLAIN, SIZE = range(8)  # columns of ``kept``
+FEATURES = 8  # first of the features among them; slopes follow
 COSINE = FEATURES + 2  # of the angle between ray and normal, n · d
-OBSERVED = (V, PLAIN, SIZE, COSINE)  # columns of ``kept`` that are the rows of ``observed``
+OBSERVED = (V, MEAN, ROBUST, PLAIN, SIZE, COSINE)  # columns of ``kept`` that are the rows of ``observed``
 
 
 class Points(NamedTuple):
@@ -78,9 +79,9 @@ class Sums(NamedTuple):
 
     statistics (s, 4 + bins): COUNT … FIRST_BIN; means (s, 2): Σ w, Σ w v of a group, scratch; normal (g, F, F),
     swept (g, 3, F), swept_twice (g, 3, 3), right (g, F), right_swept (g, 3): see :class:`pipeline.maths.adjustment.
-    interval_sums.IntervalSums`; scalars (g, 3): Σ w v², Σ e, Σ e². Written: observed (4, n): of each point v, its
-    weight not reduced for a large residual, its normalised |v| (zero if the robust weight is zero) and COSINE; or
-    (4, 0): nothing.
+    interval_sums.IntervalSums`; scalars (g, 3): Σ w v², Σ e, Σ e². Written: observed (6, n): of each point v, the
+    mean of the noise that was taken from it, the robust weight, the full weight without it, the normalised |v| (zero if
+    the robust weight is zero) and COSINE; or (6, 0): nothing.
     """
 
     statistics: Array
@@ -176,6 +177,7 @@ def weigh(row: Array, variance: float, surface: int, noise: Noise, statistics: A
         of_surface[INFORMATION] += row[EDGE]
     bins = len(of_surface) - FIRST_BIN
     of_surface[FIRST_BIN + min(int(min(abs(normalised) / noise.bin_width, 1e9)), bins - 1)] += 1.0
+    row[ROBUST] = robust
     row[PLAIN] = row[EDGE] / (scaled * noise.edge_share[surface])
     row[WEIGHT] = robust * row[PLAIN]
     row[SIZE] = abs(normalised) if robust > 0.0 else 0.0

@@ -18,6 +18,7 @@ from pipeline.maths.kernels.interval_group import (
     FEATURES,
     LINE,
     MATRIX,
+    MEAN,
     NOISE,
     POINTS,
     RECORDS,
@@ -86,7 +87,7 @@ def sum_laser_points(
             away = ray[2] * (noise.range_m**2 - across)
             variance = away * ray[2] + across
             turning = across / range_m * (1 - ray[2] * ray[2])
-            row[V], row[EDGE], row[COSINE] = v, points.edge[p], ray[2]
+            row[V], row[MEAN], row[EDGE], row[COSINE] = v, 0.0, points.edge[p], ray[2]
             row[FEATURES + 3] = (np.sign(ray[2]) - ray[2]) / AT_45_DEG
             row[SLOPES], row[SLOPES + 1] = away * ray[0] / variance, away * ray[1] / variance
             row[SLOPES + 2], row[SLOPES + 3] = turning / variance, -turning / AT_45_DEG / variance

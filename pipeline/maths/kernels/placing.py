@@ -1,9 +1,9 @@
 """Points from the frame of a sensor or of the body into the frame of the trajectory.
 
 The formulas are those of :class:`pipeline.maths.geometry.trajectory.Trajectory`: x' = p + R Exp(v) (M x + l) with
-p = p_k + s (p_{k+1} - p_k) and v = s φ_k. Exp(v) y is evaluated as y + a v × y + b v × (v × y) (Rodrigues), a = sin t / t
-and b = (1 - cos t) / t² with t = |v|, without forming a matrix for each point. Points that follow each other between
-the same two records are placed together, so that the processor can work on several at a time.
+p = p_k + s (p_{k+1} - p_k) and v = s φ_k. Exp(v) y is evaluated as y + a v × y + b v × (v × y) (Rodrigues), with
+a = sin t / t, b = (1 - cos t) / t² and t = |v|, without forming a matrix for each point. Points that follow each other
+between the same two records are placed together, so that the processor can work on several at a time.
 """
 
 from typing import NamedTuple
@@ -45,7 +45,7 @@ def interval_of(t: int, record_ns: Integers, near: int) -> int:
     last = len(record_ns) - 2
     k = near
     if t < record_ns[k] or (k < last and t >= record_ns[min(k + 8, last)]):
-        return int(min(max(np.searchsorted(record_ns, t, side="right") - 1, 0), last))
+        return min(max(int(np.searchsorted(record_ns, t, side="right")) - 1, 0), last)
     while k < last and record_ns[k + 1] <= t:
         k += 1
     return k

@@ -200,9 +200,8 @@ def _less_square(lines: Array, sums: Array) -> None:
         of_row = sums[p]
         a, b, c, d, e, f = lines[0, p], lines[1, p], lines[2, p], lines[3, p], lines[4, p], lines[5, p]
         for q in range(len(sums)):
-            of_row[q] -= (
-                a * lines[0, q] + b * lines[1, q] + c * lines[2, q] + d * lines[3, q] + e * lines[4, q] + f * lines[5, q]
-            )
+            swept = a * lines[0, q] + b * lines[1, q] + c * lines[2, q] + d * lines[3, q]
+            of_row[q] -= swept + e * lines[4, q] + f * lines[5, q]
 
 
 @compiled((BLOCKS, BLOCKS, BLOCKS, LINE, MATRICES, LINE))

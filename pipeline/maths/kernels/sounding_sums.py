@@ -19,6 +19,7 @@ from pipeline.maths.kernels.interval_group import (
     FEATURES,
     LINE,
     MATRIX,
+    MEAN,
     NOISE,
     NUMBERS,
     POINTS,
@@ -121,7 +122,8 @@ def _observe(
     fan, c = y / range_m, -z / range_m
     steep = _bounded(c, FLATTEST_FAN, c)
     curved = normal[1] * fan + normal[2] * fan * fan * (1 - fan * fan) / steep**3
-    row[V] = v - reached * angle * (slant * (0.5 + (side / slant) ** 2) - curved / 2) * noise.factor[s]
+    row[MEAN] = reached * angle * (slant * (0.5 + (side / slant) ** 2) - curved / 2) * noise.factor[s]
+    row[V] = v - row[MEAN]
     down = _bounded(z, STEEPEST * range_m, -z)
     steering = normal[0] * x + normal[1] * y + normal[2] * (x * x + y * y) / down
     speed = steering + ray[2] * range_m

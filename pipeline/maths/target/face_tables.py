@@ -27,7 +27,7 @@ def face_tables(faces: Sequence[Face], seen: str) -> FaceTables:
     """
     planes = _parallel_planes(faces, seen)
     offsets = [sorted(of_axis) for of_axis in planes.values()]
-    in_planes = [of_axis[offset] for of_axis, ascending in zip(planes.values(), offsets, strict=True) for offset in ascending]
+    in_planes = [of_axis[offset] for of_axis in planes.values() for offset in sorted(of_axis)]
     edges = [face.inward_edges for face in faces]
     creases = [_crease(face.normal, line) for face in faces for line in face.creases_m]
     return FaceTables(
