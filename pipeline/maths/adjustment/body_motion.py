@@ -13,8 +13,8 @@ from pipeline.maths.adjustment.pose_errors import (
     knot_spacing,
     place_knots,
 )
-from pipeline.maths.geometry.rotations import exp_so3
 from pipeline.maths.geometry.trajectory import NS_PER_S, Trajectory
+from pipeline.maths.kernels.poses import Drift
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -95,11 +95,11 @@ class BodyMotion:
         drift : DriftEstimate or None
             The drift estimated so far.
         """
-        positions, T = self.trajectory.poses_within(record, share)
-        if drift is not None:
-            error = drift.at(self.times(record, share))
-            positions, T = positions + error[:, :3], exp_so3(error[:, 3:]) @ T
-        return BodyPoses(positions, T, self.rates[record])
+        if drift is None:
+            poses = self.trajectory.poses_within(record, share)
+        else:
+            poses = self.trajectory.poses_with_drift(record, share, Drift(drift.knots.seconds, drift.values))
+        return BodyPoses(*poses, self.rates[record])
 
     def lever_arm(self, sensor: str, state: State) -> Array:
         """Return the sensor's lever arm (3,) m, body axes: the estimate if it is calibrated, else as configured."""

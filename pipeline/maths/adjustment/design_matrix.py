@@ -77,10 +77,10 @@ from numpy.typing import NDArray
 
 from pipeline.maths.adjustment.body_motion import BodyPoses
 from pipeline.maths.adjustment.interval_sums import N_MOVED, Runs
-from pipeline.maths.adjustment.parameters import FEATURES, N_SURFACE, N_WET, ObservedSurface, State
+from pipeline.maths.adjustment.parameters import FEATURES, ObservedSurface, State
 from pipeline.maths.adjustment.pose_errors import N_POSE
-from pipeline.maths.geometry.rotations import skew
-from pipeline.maths.mount_parameters import N_MOUNT
+from pipeline.maths.kernels.compiled import block
+from pipeline.maths.kernels.interval_designs import Form, Plane, design_intervals
 from pipeline.maths.sonar.soundings import across_beam
 
 Array = NDArray[np.float64]
@@ -252,9 +252,9 @@ class SensorOnSurface:
 def pose_design(surfaces: Sequence[ObservedSurface], surface: Integers) -> Array:
     """Return the design K (g, 3, 6) of pose errors (δ, ω), a row for each of 1, α, β, by surface number (g,)."""
     blocks = np.zeros((len(surfaces), N_MOVED, N_POSE))
-    for block, plane in zip(blocks, surfaces, strict=True):
+    for of_surface, plane in zip(blocks, surfaces, strict=True):
         first, second = plane.tangents
-        block[0, :3], block[1, 3:], block[2, 3:] = plane.normal, -second, first
+        of_surface[0, :3], of_surface[1, 3:], of_surface[2, 3:] = plane.normal, -second, first
     return blocks[surface]
 
 
@@ -273,28 +273,11 @@ def parameter_design(state: State, observed: SensorOnSurface, poses: BodyPoses) 
     poses : BodyPoses
         The body at each of g intervals.
     """
-    plane, T = state.surfaces[observed.surface], poses.R_target_from_body
-    first, second = plane.tangents
-    design = np.zeros((len(T), observed.features, len(state.columns(observed.sensor, observed.surface))))
-    from_centre = poses.positions_m - plane.centre_m
-    # turns and shift of the surface
-    design[:, 0, 0], design[:, 1, 0] = from_centre @ first, 1.0
-    design[:, 0, 1], design[:, 2, 1] = from_centre @ second, 1.0
-    design[:, 0, 2] = -1.0
-    # rotation and lever arm of the mount
-    turn, arm = slice(N_SURFACE, N_SURFACE + 3), slice(N_SURFACE + 3, N_SURFACE + N_MOUNT)
-    across = T @ observed.lever_arm_m @ skew(plane.normal)  # T l × n
-    design[:, 0, turn], design[:, 1, turn], design[:, 2, turn] = -(across[:, None] @ T)[:, 0], -(second @ T), first @ T
-    design[:, 0, arm] = plane.normal @ T
-    # latency, parameters with a feature of their own, and the range of level faces
-    latency, further = N_SURFACE + N_MOUNT, len(FEATURES[observed.sensor])
-    design[:, :N_MOVED, latency] = -poses.rates @ pose_design([plane], np.zeros(1, dtype=np.int64))[0].T
-    for number in range(further):
-        design[:, N_MOVED + number, latency + 1 + number] = 1.0
-    if observed.sensor == "mbes" and plane.level:
-        design[:, N_MOVED, latency + 1 + further] = 1.0
-    # the wet faces turn and shift like the surface, and bow
-    if observed.sensor == "mbes":
-        design[:, :, -N_WET:-1] = design[:, :, :N_SURFACE]
-        design[:, -1, -1] = 0.0 if plane.level else -1.0
+    plane = state.surfaces[observed.surface]
+    design = np.zeros((len(poses.rates), observed.features, len(state.columns(observed.sensor, observed.surface))))
+    wet, further = observed.sensor == "mbes", len(FEATURES[observed.sensor])
+    form = Form(further, level_range=wet and plane.level, wet=wet, bow=wet and not plane.level)
+    seen = Plane(*map(block, (plane.normal, plane.tangents, plane.centre_m, observed.lever_arm_m)))
+    at = (block(each) for each in (poses.positions_m, poses.R_target_from_body, poses.rates))
+    design_intervals(*at, seen, form, design)
     return design

@@ -7,14 +7,14 @@ from numpy.typing import NDArray
 
 from pipeline.maths.geometry.geodesy import PoolFrame, ecef_from_geodetic, rotation_ecef_from_level
 from pipeline.maths.geometry.rotations import (
-    exp_so3,
     log_so3,
     quaternion_from_rotation,
     rotation_from_attitude,
     rotation_from_quaternion,
 )
 from pipeline.maths.kernels.compiled import block
-from pipeline.maths.kernels.placing import Records, Sensor, place_points
+from pipeline.maths.kernels.placing import Sensor, place_points
+from pipeline.maths.kernels.poses import Drift, Records, pose_intervals
 
 Array = NDArray[np.float64]
 Times = NDArray[np.int64]
@@ -96,9 +96,17 @@ class Trajectory:
 
     def poses_within(self, record: NDArray[np.int64], share: Array) -> tuple[Array, Array]:
         """Return positions and rotations at a share (n,) of the interval from each record (n,) to the next."""
-        step = self.positions_m[record + 1] - self.positions_m[record]
-        positions = self.positions_m[record] + share[:, None] * step
-        return positions, self.R_frame_from_body[record] @ exp_so3(self.steps_rad[record] * share[:, None])
+        return self.poses_with_drift(record, share, Drift(np.empty(0), np.empty((0, 6))))
+
+    def poses_with_drift(self, record: NDArray[np.int64], share: Array, drift: Drift) -> tuple[Array, Array]:
+        """Return positions p + δ and rotations Exp(ω) R, for a drift (δ, ω) at seconds since the first record."""
+        positions, R = np.empty((len(record), 3)), np.empty((len(record), 3, 3))
+        pose_intervals(block(record), block(share), self._records, drift, positions, R)
+        return positions, R
+
+    @property
+    def _records(self) -> Records:
+        return Records(*map(block, (self.t_ns, self.positions_m, self.R_frame_from_body, self.steps_rad)))
 
     def rates(self, reach_s: float) -> Array:
         """Return velocity and rate of rotation at each record in this frame, (n, 6) m/s and rad/s.
@@ -133,10 +141,9 @@ class Trajectory:
         R_body_from_sensor, lever_arm_m
             The sensor's mount (3, 3) and (3,).
         """
-        records = Records(self.t_ns, self.positions_m, self.R_frame_from_body, self.steps_rad)
         placed = np.empty((3, len(points_m)))
         sensor = Sensor(block(R_body_from_sensor), block(lever_arm_m))
-        place_points(block(t_ns), block(points_m.T), Records(*map(block, records)), sensor, placed)
+        place_points(block(t_ns), block(points_m.T), self._records, sensor, placed)
         return placed.T
 
     def track_of_point(self, t_ns: Times, point_body_m: Array) -> Array:

@@ -13,20 +13,12 @@ from numba import float64, int64
 from numpy.typing import NDArray
 
 from pipeline.maths.kernels.compiled import compiled, named
+from pipeline.maths.kernels.poses import RECORDS, Records, rotation_coefficients
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-LINE, MATRIX, CUBE, NUMBERS = float64[::1], float64[:, ::1], float64[:, :, ::1], int64[::1]
+LINE, MATRIX, NUMBERS = float64[::1], float64[:, ::1], int64[::1]
 SERIES = 0.01  # largest t² for which four terms of the series are exact to 1e-15
-
-
-class Records(NamedTuple):
-    """Records of an INS: times (r,) ns, ascending, positions (r, 3) m, rotations (r, 3, 3), steps φ (r, 3) rad."""
-
-    t_ns: Integers
-    position_m: Array
-    R_frame_from_body: Array
-    step_rad: Array
 
 
 class Sensor(NamedTuple):
@@ -36,7 +28,7 @@ class Sensor(NamedTuple):
     lever_arm_m: Array
 
 
-RECORDS, SENSOR = named(Records, NUMBERS, MATRIX, CUBE, MATRIX), named(Sensor, MATRIX, LINE)
+SENSOR = named(Sensor, MATRIX, LINE)
 
 
 @compiled()
@@ -85,7 +77,7 @@ def place_points(t_ns: Integers, points_m: Array, records: Records, sensor: Sens
                 a = 1 - tt / 6 * (1 - tt / 20 * (1 - tt / 42 * (1 - tt / 72)))
                 b = 0.5 - tt / 24 * (1 - tt / 30 * (1 - tt / 56 * (1 - tt / 90)))
             else:
-                a, b = _coefficients(tt)
+                a, b = rotation_coefficients(tt)
             x, y, z = points_m[0, i], points_m[1, i], points_m[2, i]
             y0 = M[0, 0] * x + M[0, 1] * y + M[0, 2] * z + lever[0]
             y1 = M[1, 0] * x + M[1, 1] * y + M[1, 2] * z + lever[1]
@@ -99,16 +91,3 @@ def place_points(t_ns: Integers, points_m: Array, records: Records, sensor: Sens
                     p[axis] + s * (q[axis] - p[axis]) + R[axis, 0] * y0 + R[axis, 1] * y1 + R[axis, 2] * y2
                 )
         first = end
-
-
-@compiled()
-def _coefficients(squared_angle: float) -> tuple[float, float]:
-    """Return a and b, as :func:`pipeline.maths.geometry.rotations.exp_coefficients`."""
-    if squared_angle < 1e-6:
-        return (
-            1 - squared_angle / 6 + squared_angle * squared_angle / 120,
-            0.5 - squared_angle / 24 + squared_angle * squared_angle / 720,
-        )
-    t = np.sqrt(squared_angle)
-    half = np.sin(t / 2) / t
-    return np.sin(t) / t, 2 * half * half
