@@ -278,6 +278,6 @@ def parameter_design(state: State, observed: SensorOnSurface, poses: BodyPoses) 
     wet, further = observed.sensor == "mbes", len(FEATURES[observed.sensor])
     form = Form(further, level_range=wet and plane.level, wet=wet, bow=wet and not plane.level)
     seen = Plane(*map(block, (plane.normal, plane.tangents, plane.centre_m, observed.lever_arm_m)))
-    at = (block(each) for each in (poses.positions_m, poses.R_target_from_body, poses.rates))
-    design_intervals(*at, seen, form, design)
+    positions_m, T, rates = map(block, (poses.positions_m, poses.R_target_from_body, poses.rates))
+    design_intervals(positions_m, T, rates, seen, form, design)
     return design

@@ -6,16 +6,14 @@ The formulas are those of :class:`pipeline.maths.target.face.Face`.
 from typing import NamedTuple
 
 import numpy as np
-from numba import boolean, float64, int64
 from numpy.typing import NDArray
 
-from pipeline.maths.kernels.compiled import compiled, named
+from pipeline.maths.kernels.compiled import CUBE, FLAGS, LINE, MATRIX, NUMBERS, compiled, named
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 NO_REACH = (0.0, 0.0)
-LINE, MATRIX, NUMBERS, FLAGS = float64[::1], float64[:, ::1], int64[::1], boolean[::1]
 
 
 class FaceTables(NamedTuple):
@@ -47,7 +45,7 @@ class FaceTables(NamedTuple):
 
 FACES = named(
     FaceTables, MATRIX, NUMBERS, LINE, NUMBERS, NUMBERS, MATRIX, MATRIX, NUMBERS, MATRIX, LINE, FLAGS, NUMBERS,
-    float64[:, :, ::1], LINE,
+    CUBE, LINE,
 )  # fmt: skip
 
 

@@ -3,13 +3,11 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import boolean, float64, int64
 from numpy.typing import NDArray
 
-from pipeline.maths.kernels.compiled import compiled, named
+from pipeline.maths.kernels.compiled import CUBE, FLAG, INTEGER, LINE, MATRIX, compiled, named
 
 Array = NDArray[np.float64]
-LINE, MATRIX, CUBE = float64[::1], float64[:, ::1], float64[:, :, ::1]
 N_SURFACE, N_MOUNT, N_WET = 3, 6, 4  # parameters: turns and shift; rotation and lever arm; turns, shift and bow
 N_MOVED = 3  # features on which a pose error acts: 1, α, β
 
@@ -36,7 +34,7 @@ class Form(NamedTuple):
 
 
 PLANE = named(Plane, LINE, MATRIX, LINE, LINE)
-FORM = named(Form, int64, boolean, boolean, boolean)
+FORM = named(Form, INTEGER, FLAG, FLAG, FLAG)
 
 
 @compiled()

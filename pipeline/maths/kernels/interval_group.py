@@ -9,14 +9,12 @@ which stays in the processor's cache.
 from typing import NamedTuple
 
 import numpy as np
-from numba import float64, int64
 from numpy.typing import NDArray
 
-from pipeline.maths.kernels.compiled import compiled, named
+from pipeline.maths.kernels.compiled import CUBE, FLOAT, LINE, MATRIX, NUMBERS, compiled, named
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-LINE, MATRIX, CUBE, NUMBERS = float64[::1], float64[:, ::1], float64[:, :, ::1], int64[::1]
 N_MOVED = 3  # features on which a pose error acts
 COUNT, CUT, REDUCED, INFORMATION, FIRST_BIN = 0, 1, 2, 3, 4  # columns of the statistics of a surface
 V, WEIGHT, COMMON, EDGE, MEAN, ROBUST, PLAIN, SIZE = range(8)  # columns of ``kept``
@@ -98,7 +96,7 @@ class Sums(NamedTuple):
 POINTS = named(Points, MATRIX, LINE, NUMBERS, LINE, NUMBERS, LINE, NUMBERS)
 RECORDS = named(Records, MATRIX, CUBE)
 SURFACES = named(Surfaces, CUBE, LINE)
-NOISE = named(Noise, LINE, LINE, LINE, float64, float64, LINE, float64, float64, float64)
+NOISE = named(Noise, LINE, LINE, LINE, FLOAT, FLOAT, LINE, FLOAT, FLOAT, FLOAT)
 SUMS = named(Sums, MATRIX, MATRIX, CUBE, CUBE, CUBE, MATRIX, MATRIX, MATRIX, MATRIX)
 
 

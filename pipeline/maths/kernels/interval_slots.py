@@ -5,17 +5,15 @@ A *slot* holds the sums of one interval, the points of one surface between two I
 """
 
 import numpy as np
-from numba import float64, int64
 from numpy.typing import NDArray
 
-from pipeline.maths.kernels.compiled import compiled
+from pipeline.maths.kernels.compiled import INTEGER, LINE, NUMBERS, compiled
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-LINE, NUMBERS = float64[::1], int64[::1]
 
 
-@compiled((NUMBERS, NUMBERS, NUMBERS, int64, NUMBERS, LINE, NUMBERS, NUMBERS, NUMBERS))
+@compiled((NUMBERS, NUMBERS, NUMBERS, INTEGER, NUMBERS, LINE, NUMBERS, NUMBERS, NUMBERS))
 def slots_of(
     t_ns: Integers, surface: Integers, record_ns: Integers, surfaces: int, record: Integers, share: Array,
     slot: Integers, slot_record: Integers, slot_surface: Integers,

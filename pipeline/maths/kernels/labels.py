@@ -6,15 +6,13 @@ The conditions are those of :func:`pipeline.maths.target.labelling.label_points`
 from typing import NamedTuple
 
 import numpy as np
-from numba import boolean, float64, int8, int16
 from numpy.typing import NDArray
 
-from pipeline.maths.kernels.compiled import compiled, named
+from pipeline.maths.kernels.compiled import CUBE, FLAGS, FLOAT, LINE, MATRIX, Block, compiled, named
 from pipeline.maths.kernels.faces import FACES, FaceTables, clearance, inside, nearest_plane, product
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-LINE, MATRIX, CUBE, FLAGS = float64[::1], float64[:, ::1], float64[:, :, ::1], boolean[::1]
 LABELLED, OFF_SURFACE, NEAR_EDGE, GRAZING, NOT_AMONG = 0, 1, 2, 3, 4  # reasons
 MOST_SLANTED = 0.01  # smallest cosine of incidence by which the length of a round beam's spot is computed
 TINY = float(np.finfo(np.float64).tiny)
@@ -55,9 +53,9 @@ class Labels(NamedTuple):
     reason: NDArray[np.int8]
 
 
-BEAMS = named(Beams, MATRIX, LINE, CUBE, LINE, float64)
-LIMITS = named(Limits, *[float64] * 8)
-LABELS = named(Labels, int16[::1], LINE, LINE, int8[::1])
+BEAMS = named(Beams, MATRIX, LINE, CUBE, LINE, FLOAT)
+LIMITS = named(Limits, *[FLOAT] * 8)
+LABELS = named(Labels, Block("int16", 1), LINE, LINE, Block("int8", 1))
 
 
 @compiled()
@@ -162,7 +160,7 @@ def rays(origins_m: Array, points_m: Array, direction: Array, range_m: Array) ->
         direction[0, i], direction[1, i], direction[2, i] = x / range_m[i], y / range_m[i], z / range_m[i]
 
 
-@compiled((MATRIX, float64, FACES, FLAGS))
+@compiled((MATRIX, FLOAT, FACES, FLAGS))
 def near_planes(points_m: Array, reach_m: float, faces: FaceTables, near: Flags) -> None:
     """Take away from ``near`` (n,) the points (3, n) that lie within ``reach_m`` of no plane."""
     for i in range(points_m.shape[1]):

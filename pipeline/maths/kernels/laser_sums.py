@@ -10,14 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.maths.adjustment.design_matrix import AT_45_DEG
-from pipeline.maths.kernels.compiled import compiled, named
+from pipeline.maths.kernels.compiled import LINE, MATRIX, compiled, named
 from pipeline.maths.kernels.interval_group import (
     COMMON,
     COSINE,
     EDGE,
     FEATURES,
-    LINE,
-    MATRIX,
     MEAN,
     NOISE,
     POINTS,

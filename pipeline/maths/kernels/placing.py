@@ -9,15 +9,13 @@ between the same two records are placed together, so that the processor can work
 from typing import NamedTuple
 
 import numpy as np
-from numba import float64, int64
 from numpy.typing import NDArray
 
-from pipeline.maths.kernels.compiled import compiled, named
+from pipeline.maths.kernels.compiled import LINE, MATRIX, NUMBERS, compiled, named
 from pipeline.maths.kernels.poses import RECORDS, Records, rotation_coefficients
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-LINE, MATRIX, NUMBERS = float64[::1], float64[:, ::1], int64[::1]
 SERIES = 0.01  # largest t² for which four terms of the series are exact to 1e-15
 
 

@@ -7,14 +7,12 @@ The formulas are those of :class:`pipeline.maths.geometry.trajectory.Trajectory`
 from typing import NamedTuple
 
 import numpy as np
-from numba import float64, int64
 from numpy.typing import NDArray
 
-from pipeline.maths.kernels.compiled import compiled, named
+from pipeline.maths.kernels.compiled import CUBE, LINE, MATRIX, NUMBERS, compiled, named
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-LINE, MATRIX, CUBE, NUMBERS = float64[::1], float64[:, ::1], float64[:, :, ::1], int64[::1]
 NS_PER_S = 1e9
 
 

@@ -5,17 +5,14 @@ standard deviation of zero is no special case. y = (x, knot before, knot after, 
 """
 
 import numpy as np
-from numba import float64, int64
 from numpy.typing import NDArray
 
-from pipeline.maths.kernels.compiled import compiled
+from pipeline.maths.kernels.compiled import CUBE, CUBES, LINE, MATRIX, NUMBERS, compiled
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 N_POSE, N_MOVED = 6, 3  # numbers of a pose error, and of the features on which it acts
-LINE, MATRIX, MATRICES, BLOCKS = float64[::1], float64[:, ::1], float64[:, :, ::1], float64[:, :, :, ::1]
-NUMBERS = int64[::1]
-LINEAR = (NUMBERS, MATRICES, MATRIX, MATRIX, MATRICES, MATRIX)  # sides, design, pose, by_knot, normal, right
+LINEAR = (NUMBERS, CUBE, MATRIX, MATRIX, CUBE, MATRIX)  # sides, design, pose, by_knot, normal, right
 
 
 @compiled()
@@ -53,7 +50,7 @@ def _by_parameters(normal: Array, design: Array, right: Array, product: Array) -
                 product[f, column] += normal[f, h] * design[h, column]
 
 
-@compiled((MATRICES, NUMBERS, *LINEAR, LINE))
+@compiled((CUBE, NUMBERS, *LINEAR, LINE))
 def add_intervals(
     sums: Array, span: Integers, sides: Integers, design: Array, pose: Array, by_knot: Array,
     normal: Array, right: Array, squares: Array,
@@ -107,7 +104,7 @@ def add_intervals(
                         to[first + row, knots + other * N_POSE + column] += share * square[row, column]
 
 
-@compiled((BLOCKS, BLOCKS, BLOCKS, NUMBERS, NUMBERS, *LINEAR, MATRICES, MATRIX, MATRICES))
+@compiled((CUBES, CUBES, CUBES, NUMBERS, NUMBERS, *LINEAR, CUBE, MATRIX, CUBE))
 def add_records(
     own: Array, ahead: Array, border: Array, span: Integers, record: Integers, sides: Integers, design: Array,
     pose: Array, by_knot: Array, normal: Array, right: Array, swept: Array, right_swept: Array, swept_twice: Array,
@@ -204,7 +201,7 @@ def _less_square(lines: Array, sums: Array) -> None:
             of_row[q] -= swept + e * lines[4, q] + f * lines[5, q]
 
 
-@compiled((BLOCKS, BLOCKS, BLOCKS, LINE, MATRICES, LINE))
+@compiled((CUBES, CUBES, CUBES, LINE, CUBE, LINE))
 def eliminate_records(
     own: Array, ahead: Array, border: Array, white: Array, sums: Array, log_determinant: Array
 ) -> None:  # fmt: skip

@@ -1,14 +1,12 @@
 """Sums of residuals by bin and slot of time, as :func:`pipeline.maths.adjustment.residual_means.residual_sums` says."""
 
 import numpy as np
-from numba import float64, int64
 from numpy.typing import NDArray
 
-from pipeline.maths.kernels.compiled import compiled
+from pipeline.maths.kernels.compiled import LINE, MATRIX, NUMBERS, compiled
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-LINE, MATRIX, NUMBERS = float64[::1], float64[:, ::1], int64[::1]
 
 
 @compiled((NUMBERS, LINE, LINE, LINE, MATRIX, LINE))

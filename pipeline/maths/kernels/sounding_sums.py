@@ -10,18 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.maths.adjustment.design_matrix import AT_45_DEG, FLATTEST, FLATTEST_FAN, SPEED_M_S, STEEPEST
-from pipeline.maths.kernels.compiled import compiled, named
+from pipeline.maths.kernels.compiled import CUBE, LINE, MATRIX, NUMBERS, compiled, named
 from pipeline.maths.kernels.interval_group import (
     COMMON,
     COSINE,
-    CUBE,
     EDGE,
     FEATURES,
-    LINE,
-    MATRIX,
     MEAN,
     NOISE,
-    NUMBERS,
     POINTS,
     RECORDS,
     SUMS,

@@ -6,20 +6,18 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
-from numba import float64
 
-from pipeline.maths.kernels import compiled as module
-from pipeline.maths.kernels.compiled import compiled
+from pipeline.maths.kernels.compiled import LINE, compiled
 from tests.support.roots import ROOT
 
 SOURCE = '''
-from numba import float64
-from pipeline.maths.kernels.compiled import compiled
+from pipeline.maths.kernels.compiled import FLOAT, compiled
 from folder.inner import inner
 FACTOR = {factor}
-@compiled((float64,))
+@compiled((FLOAT,))
 def outer(x):
     return FACTOR * inner(x)
 '''
@@ -70,11 +68,11 @@ def test_many_threads_at_once_compile_once(monkeypatch: pytest.MonkeyPatch) -> N
         calls.append(words)
         return lambda function: function
 
-    @compiled((float64[::1],))
+    @compiled((LINE,))
     def total(values: np.ndarray) -> float:
         return float(values.sum())
 
-    monkeypatch.setattr(module, "njit", counted)
+    monkeypatch.setattr(numba, "njit", counted)
     with ThreadPoolExecutor(8) as threads:
         found = list(threads.map(total, [np.ones(k) for k in range(20)]))
     assert found == [float(k) for k in range(20)]
