@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy.linalg import block_diag
 
 from pipeline.adjustment.error_sources import ERROR_SOURCES, OWNERS, source_of
 from pipeline.config.mount import Mount
@@ -42,6 +41,8 @@ def contributions(freed: pd.DataFrame, block: Mapping[str, Any], correlated: boo
     correlated
         Whether the errors of the laser's mount correlate (:func:`laser_correlates`).
     """
+    from scipy.linalg import block_diag
+
     if block["covariance_total"] is None:
         return {}
     turned = mount_partials(mount_of(Mount(**block["mount"])).R_body_from_sensor)

@@ -10,6 +10,7 @@ calls none of their functions. Imports in these functions count only if the pack
 import ast
 import functools
 import hashlib
+import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -66,10 +67,10 @@ def _packages_above(name: str) -> list[str]:
 
 def file_of_module(root: Path, name: str) -> Path | None:
     """Return the file of a module; None if ``root`` does not contain it."""
-    place = root / name.replace(".", "/")
-    for path in (place.with_name(place.name + ".py"), place / "__init__.py"):
-        if path.is_file():
-            return path
+    place = os.path.join(root, *name.split("."))
+    for path in (f"{place}.py", os.path.join(place, "__init__.py")):  # thousands: as texts in a third of the time
+        if os.path.isfile(path):
+            return Path(path)
     return None
 
 

@@ -15,8 +15,6 @@ median it gives k, and σ.
 """
 
 import numpy as np
-from scipy.optimize import brentq
-from scipy.special import ndtr, ndtri
 
 from pipeline.artefacts.streams import Batch, point_array
 from pipeline.target.labelled_points import LabellingContext
@@ -47,6 +45,8 @@ def fitting_gate_m(labelled: Batch, context: LabellingContext) -> float:
 
 def sigma_through_gate(median_m: float, gate_m: float) -> float:
     """Return the sigma (m) of normal noise by the median of its absolute values within a gate."""
+    from scipy.optimize import brentq
+    from scipy.special import ndtr, ndtri
 
     def excess(k: float) -> float:
         return float(ndtri(0.25 + ndtr(k) / 2) / k) - median_m / gate_m

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from pipeline.maths.adjustment.eliminate_white_noise import ReducedIntervals
 from pipeline.maths.adjustment.pose_errors import N_POSE, DriftEstimate, PoseNoise
@@ -53,6 +52,8 @@ def eliminate_drift(reduced: ReducedIntervals, noise: PoseNoise, drift: DriftEst
     drift : DriftEstimate
         The drift at which the observations were linearised.
     """
+    from scipy.linalg import cho_solve_banded, cholesky_banded
+
     knots, current = drift.knots, drift.values
     u, count = len(reduced.others) - 1, len(knots.record)
     scale = noise.drift

@@ -27,7 +27,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtrc, gammaln, ndtri_exp
 
 from pipeline.maths.adjustment.solution import Solution
 
@@ -96,6 +95,8 @@ def normal_deviate_of(fall: float, dof: int) -> float:
     >>> round(normal_deviate_of(9.0, 1), 6), round(normal_deviate_of(3600.0, 1), 6), normal_deviate_of(0.0, 3)
     (3.0, 60.0, 0.0)
     """
+    from scipy.special import chdtrc, ndtri_exp
+
     if dof == 0 or fall <= 0:
         return 0.0
     probability = float(chdtrc(dof, fall))
@@ -112,6 +113,8 @@ def _log_tail(fall: float, dof: int) -> float:
 
     (Abramowitz & Stegun 1964, 6.5.32), whose terms are summed as long as they fall.
     """
+    from scipy.special import gammaln
+
     a, x = dof / 2, fall / 2
     total = term = 1.0
     for k in range(1, TERMS):

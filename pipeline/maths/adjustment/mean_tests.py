@@ -26,7 +26,6 @@ The residuals are those of adjusted surfaces and mounts, and so drawn towards ze
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri
 
 Array = NDArray[np.float64]
 
@@ -56,5 +55,7 @@ def joint_limit(number: int, level: float) -> float:
     >>> round(joint_limit(1, 0.05), 2), round(joint_limit(500, 0.001), 2)
     (1.96, 4.75)
     """
+    from scipy.special import ndtri
+
     each = -np.expm1(np.log1p(-level) / max(number, 1))
     return float(-ndtri(each / 2))

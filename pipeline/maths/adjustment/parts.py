@@ -17,7 +17,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtrc, ndtri
 
 from pipeline.maths.adjustment.solution import ConsiderErrors, Solution
 
@@ -52,6 +51,8 @@ def deviation(part: Solution, whole: Solution, consider: ConsiderErrors, mount: 
     mount : (m,) array
         Numbers of the mount parameters.
     """
+    from scipy.special import chdtrc, ndtri
+
     change = part.step[mount] - whole.step[mount]
     Q = consider.covariance(whole.fixed)
     between = part.sensitivity_of(mount) - whole.sensitivity_of(mount)

@@ -37,7 +37,6 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag
 
 from pipeline.maths.adjustment.parameters import N_SURFACE, ObservedSurface, State
 
@@ -98,6 +97,8 @@ class ParameterPrior:
 
         ``known`` of these must have the values of the others too.
         """
+        from scipy.linalg import block_diag
+
         numbers = np.concatenate([self.numbers, other.numbers])
         return ParameterPrior(numbers, block_diag(self.covariance, other.covariance), self.known)
 

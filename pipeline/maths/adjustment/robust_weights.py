@@ -2,7 +2,6 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
 Array = NDArray[np.float64]
 
@@ -48,6 +47,8 @@ def variance_kept(k0: float, k1: float) -> float:
     >>> round(variance_kept(3.0, 6.0), 4), round(variance_kept(30.0, 60.0), 4)
     (0.9924, 1.0)
     """
+    from scipy.special import ndtr
+
     low, high = (np.exp(-k * k / 2) / np.sqrt(2 * np.pi) for k in (k0, k1))
     first, between = low - high, float(ndtr(k1) - ndtr(k0))
     second = k0 * low - k1 * high + between

@@ -26,7 +26,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtri
 
 from pipeline.maths.adjustment.eliminate_drift import NormalEquations, eliminate_drift
 from pipeline.maths.adjustment.eliminate_white_noise import ReducedIntervals
@@ -96,6 +95,8 @@ def largest_ratio(dof: float, level: float) -> float:
     >>> round(largest_ratio(10.0, 0.05), 3)  # χ²₁₀ exceeds 18.31 with 5 %
     1.831
     """
+    from scipy.special import chdtri
+
     return float(chdtri(dof, level)) / dof
 
 

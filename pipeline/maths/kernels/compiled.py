@@ -152,7 +152,8 @@ def _with_parts(function: Callable[..., Any]) -> FunctionType:
     """Return the function with the names of its parts bound to what numba copies."""
     parts = {name: function.__globals__.get(name) for name in function.__code__.co_names}
     known = {name: part.to_copy() for name, part in parts.items() if isinstance(part, _Part)}
-    return FunctionType(function.__code__, function.__globals__ | known, function.__name__, function.__defaults__, function.__closure__)
+    names = function.__globals__ | known
+    return FunctionType(function.__code__, names, function.__name__, function.__defaults__, function.__closure__)
 
 
 def _constants(function: Callable[..., Any]) -> list[tuple[str, float]]:
