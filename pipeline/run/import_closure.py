@@ -41,13 +41,20 @@ def import_closure(root: Path, modules: Sequence[str]) -> list[Path]:
             continue
         visited.add((name, inside))
         waiting += [(package, False) for package in _packages_above(name)]
-        path = file_of_module(root, name)
+        path, imported = _found(root, name, inside)
         if path is not None:
             closure.add(path)
-            waiting += [(module, True) for module in imported_modules(root, path, name, inside)]
+            waiting += [(module, True) for module in imported]
     KNOWN.keep()
     folders = {path.parent for path in closure}
     return sorted(closure | {path for folder in folders for path in folder.iterdir() if _is_data(path)})
+
+
+@functools.cache  # the stages' closures share most of their modules
+def _found(root: Path, name: str, inside: bool) -> tuple[Path | None, list[str]]:
+    """Return a module's file, and the modules that it imports; None and none if ``root`` does not contain it."""
+    path = file_of_module(root, name)
+    return path, [] if path is None else imported_modules(root, path, name, inside)
 
 
 def _is_data(path: Path) -> bool:
