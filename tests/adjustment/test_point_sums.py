@@ -4,6 +4,8 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from pipeline.adjustment.iteration import adjust_mount
 from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
@@ -110,3 +112,19 @@ def test_no_points(adjusted: Case, sensor: str) -> None:
     found = summed({name: column[:0] for name, column in batches[sensor].items()}, model, sensor, values)
     assert len(found.sums) == 0
     assert not found.statistics.any()
+
+
+@given(first=st.integers(0, 5000), count=st.integers(1, 60), step=st.integers(1, 40))
+@settings(max_examples=40, deadline=None)
+def test_any_few_points(adjusted: Case, sensor: str, first: int, count: int, step: int) -> None:
+    """From one point on: whatever surfaces, intervals and weights are among them."""
+    batches, model, values = adjusted
+    rows = (first + step * np.arange(count)) % len(batches[sensor]["t_ns"])
+    batch = {name: column[rows] for name, column in batches[sensor].items()}
+    expected, statistics = by_numpy(batch, model, sensor, values)
+    found = summed(batch, model, sensor, values)
+    np.testing.assert_allclose(found.statistics[:, :FIRST_BIN], statistics[:, :FIRST_BIN], rtol=1e-12)
+    sums = merged([found.sums])
+    np.testing.assert_array_equal(sums.record, expected.record)
+    for one, other in ((sums.normal, expected.normal), (sums.right, expected.right)):
+        np.testing.assert_allclose(one, other, rtol=1e-8, atol=1e-8 * np.abs(other).max(initial=0.0))
