@@ -108,7 +108,7 @@ def accumulate(streams: Mapping[str, Stream], model: ObservationModel, values: C
             pieces.append(piece)
             for key, group in statistics.items():
                 groups[key] = groups[key] + group if key in groups else group
-        sums[sensor] = merged(pieces)
+        sums[sensor] = merged(pieces.pop(0) for _ in range(len(pieces)))
     return Accumulation(sums, groups)
 
 

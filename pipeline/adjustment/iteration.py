@@ -215,7 +215,9 @@ def _weighted_iteration(
     state = initial_mount(streams["mbes"], model) if "mbes" in streams else model.coarse
     values = CurrentValues(state, weighting=Weighting(white=prior.noise.white))
     estimated = np.array(estimated_columns(state, settings.free))
-    for iteration in range(1, settings.max_iterations + 1):
+    iteration = 0
+    while True:
+        iteration += 1
         # read all points, and take the variance factors of sensors and surfaces from their scatter
         accumulation, weighting = reweighted(accumulate(streams, model, values), values.state, values.weighting)
         drift = values.drift or model.body.zero_drift(accumulation.records, prior.noise, gap_s)
@@ -225,23 +227,23 @@ def _weighted_iteration(
         stepped, solution = start.stepped(replace(prior.noise, white=weighting.white), estimated)
         deficient = solution.deficiency > 0
         settled = weighting.robust is not None and _is_small(solution, SETTLED)
-        if deficient or (settled and iteration >= LEAST_PASSES):
-            break
+        if deficient or (settled and iteration >= LEAST_PASSES) or iteration >= settings.max_iterations:
+            return _WeightedIteration(
+                last=start if deficient else stepped,
+                estimated=estimated,
+                weighting=weighting,
+                accumulation=accumulation,
+                settled=settled,
+                deficient=deficient,
+                iterations=iteration,
+            )
         # from the next reading on reduce the weights of outliers
         weighting = replace(weighting, robust=(settings.robust_k0, settings.robust_k1))
         if iteration > 1:  # scales and the INS's white noise come from residuals without the drift and outliers
             white = noise_seen_by_laser(prior.noise, stepped.record_noise(prior.noise)).white
             weighting = replace(weighting, scales=accumulation.robust_scales(len(state.surfaces)), white=white)
         values = CurrentValues(stepped.linearisation.state, stepped.drift, weighting)
-    return _WeightedIteration(
-        last=start if deficient else stepped,
-        estimated=estimated,
-        weighting=weighting,
-        accumulation=accumulation,
-        settled=settled,
-        deficient=deficient,
-        iterations=iteration,
-    )
+        del accumulation, linearisation, start, stepped  # the next reading needs their memory
 
 
 def _is_small(solution: Solution, limits: StepLimits) -> bool:

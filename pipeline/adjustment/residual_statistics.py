@@ -114,7 +114,7 @@ def residual_statistics(
             by_face.append(face_sums)
             for variable, sums in sums_by_variable.items():
                 pieces.setdefault(variable, []).append(sums)
-        sums_by_face[sensor] = merged(by_face)
+        sums_by_face[sensor] = merged(by_face.pop(0) for _ in range(len(by_face)))
         for variable, parts in pieces.items():
             sums = merged_residual_sums(parts)
             if variable == "pass":

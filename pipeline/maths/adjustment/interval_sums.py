@@ -170,14 +170,19 @@ def interval_sums(points: LinearisedPoints) -> IntervalSums:
 
 
 def merged(pieces: Iterable[IntervalSums]) -> IntervalSums:
-    """Return the sums of all batches together, in order; an interval may be spread over several batches."""
-    parts = list(pieces)
-    record, surface = (np.concatenate([getattr(part, name) for part in parts]) for name in ("record", "surface"))
+    """Return the sums of all batches together, in order; an interval may be spread over several batches.
+
+    Pieces to which nothing else refers give their memory back one field after the other.
+    """
+    parts = [dict(vars(piece)) for piece in pieces]
+    record, surface = (np.concatenate([part.pop(name) for part in parts]) for name in ("record", "surface"))
     order = np.lexsort((surface, record))
     first = Runs.of(record[order], surface[order]).starts
+    sorted_already = bool(np.all(order[1:] > order[:-1]))
 
     def added(name: str) -> Array:
-        return np.asarray(np.add.reduceat(np.concatenate([getattr(part, name) for part in parts])[order], first))
+        together = np.concatenate([part.pop(name) for part in parts])
+        return np.asarray(np.add.reduceat(together if sorted_already else together[order], first))
 
     sums = {name: added(name) for name in list(IntervalSums.__dataclass_fields__)[2:]}
     return IntervalSums(record=record[order[first]], surface=surface[order[first]], **sums)
