@@ -59,7 +59,7 @@ class _Slots:
         t_ns, record_ns = (np.require(times, np.int64, ("C", "W")) for times in (t_ns, record_ns))
         share = np.empty(len(t_ns))
         number = slots_of(t_ns, surface, record_ns, surfaces, record, share, slot, record_of, surface_of)
-        return cls(record, share, slot, record_of[:number], surface_of[:number])
+        return cls(record, share, slot, record_of[:number].copy(), surface_of[:number].copy())  # views would keep all
 
 
 def summed(

@@ -116,7 +116,7 @@ def residual_sample(model: ObservationModel, sensor: str, observed: SummedBatch,
     step : int
         Every ``step``-th point is in the sample.
     """
-    points = {name: column[::step] for name, column in observed.points.items()}
+    points = {name: column[::step].copy() for name, column in observed.points.items()}  # views would keep all
     v_m, mean_m, robust, *_ = observed.observed[:, ::step]
     own = point_array(points, f"{sensor}_m")
     ranges = np.linalg.norm(own, axis=1)
