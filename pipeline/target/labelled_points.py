@@ -102,16 +102,19 @@ def _label_laser(batch: Batch, context: LabellingContext) -> BatchResult:
     sensor = point_array(batch, "laser_m")
     points = context.corrected.points_from_sensor(batch["t_ns"], sensor, R_body_from_laser, lever_arm_m)
     dry = points[:, 2] > model.water_level_m + context.settings.water_margin_m / 2
-    rays = TargetBeams.from_origins(context.corrected.track_of_point(batch["t_ns"], lever_arm_m), points)
-    labels = label_points(model, points, rays, settings, dry)
+    near = np.flatnonzero(near_planes(model, points, settings.gate_m, dry, settings.seen))
+    points = points[near]
+    rays = TargetBeams.from_origins(context.corrected.track_of_point(batch["t_ns"][near], lever_arm_m), points)
+    labels = label_points(model, points, rays, settings)
     on = np.flatnonzero(labels.face >= 0)
-    t_ns = batch["t_ns"][on]
-    placed = context.trajectory.points_from_sensor(t_ns, sensor[on], R_body_from_laser, lever_arm_m)
-    columns = {"t_ns": t_ns, "pass": batch["pass"][on], "face": labels.face[on]}
-    columns |= xyz_columns("{}_laser_m", [batch[f"{axis}_laser_m"][on] for axis in "xyz"])
+    rows = near[on]
+    t_ns = batch["t_ns"][rows]
+    placed = context.trajectory.points_from_sensor(t_ns, sensor[rows], R_body_from_laser, lever_arm_m)
+    columns = {"t_ns": t_ns, "pass": batch["pass"][rows], "face": labels.face[on]}
+    columns |= xyz_columns("{}_laser_m", [batch[f"{axis}_laser_m"][rows] for axis in "xyz"])
     columns |= xyz_columns("{}_target_m", placed.T)
     columns["cos_incidence"], columns["edge_weight"] = labels.cos_incidence[on], labels.edge_weight[on]
-    counts = _counts("below or near the water line", dry, "near an edge", labels)
+    counts = _counts("below or near the water line", dry, len(near), "near an edge", labels)
     return BatchResult({"laser_labelled": columns}, counts)
 
 
@@ -135,8 +138,7 @@ def _label_soundings(batch: Batch, context: LabellingContext, mbes: SonarBeams) 
     rows = near[on]
     names = ("t_ns", "pass", "ping", "beam", "x_mbes_m", "y_mbes_m", "z_mbes_m")
     columns = {name: batch[name][rows] for name in names} | {"face": labels.face[on], "edge_weight": weight}
-    counts = _counts("above or near the water line", wet, "footprint near an edge", labels)
-    counts["off every face"] += int(wet.sum()) - len(near)
+    counts = _counts("above or near the water line", wet, len(near), "footprint near an edge", labels)
     counts |= {"footprint partly on another face": hidden, "used": len(on)}
     return BatchResult({"soundings_labelled": columns}, counts)
 
@@ -157,11 +159,14 @@ class _BeamsOnFaces:
             yield self.surface.first_met(self.origins_m[rows], rays)
 
 
-def _counts(other_side: str, own_side: NDArray[np.bool_], edge: str, labels: Labels) -> dict[str, int]:
-    """Return the number of points by reason why they have no label, and the labelled ones as ``used``."""
+def _counts(other_side: str, own_side: NDArray[np.bool_], near: int, edge: str, labels: Labels) -> dict[str, int]:
+    """Return the number of points by reason why they have no label, and the labelled ones as ``used``.
+
+    ``near``: the number of those on their own side of the water that lie near a plane; ``labels`` are theirs.
+    """
     return {
         other_side: int((~own_side).sum()),
-        "off every face": int(labels.off_surface.sum()),
+        "off every face": int(own_side.sum()) - near + int(labels.off_surface.sum()),
         edge: int(labels.near_edge.sum()),
         "ray too flat": int(labels.grazing.sum()),
         "used": int((labels.face >= 0).sum()),

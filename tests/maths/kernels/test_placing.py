@@ -8,6 +8,7 @@ from pipeline.maths.adjustment.body_motion import BodyMotion
 from pipeline.maths.adjustment.pose_errors import DriftEstimate, Knots
 from pipeline.maths.geometry.rotations import exp_so3
 from pipeline.maths.geometry.trajectory import Trajectory
+from tests.support.placing_oracle import placed_by_numpy
 
 SHAPE = {"seed": st.integers(0, 2**32), "records": st.integers(2, 40), "points": st.integers(0, 60)}
 TURNS = st.sampled_from([0.0, 1e-9, 1e-4, 0.05, 0.5, 3.0])  # rad between two records: series, and closed form
@@ -20,13 +21,6 @@ def moving(rng: np.random.Generator, records: int, turn: float) -> Trajectory:
         axis = rng.normal(size=3)
         R = np.concatenate([R, R[-1:] @ exp_so3(turn * axis / np.linalg.norm(axis))])
     return Trajectory.build(t_ns, np.cumsum(rng.normal(size=(records, 3)), axis=0), R)
-
-
-def placed_by_numpy(trajectory: Trajectory, t_ns: np.ndarray, body_m: np.ndarray) -> np.ndarray:
-    record, share = trajectory.interval_of(t_ns)
-    step = trajectory.positions_m[record + 1] - trajectory.positions_m[record]
-    R = trajectory.R_frame_from_body[record] @ exp_so3(trajectory.steps_rad[record] * share[:, None])
-    return trajectory.positions_m[record] + share[:, None] * step + np.einsum("nij,nj->ni", R, body_m)
 
 
 @given(**SHAPE, turn=TURNS, ordered=st.booleans(), sparse=st.booleans())
