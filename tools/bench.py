@@ -1,4 +1,4 @@
-"""Measure time and memory of whole runs on simulated sessions of four sizes, each four times the size before.
+"""Measure time and memory of whole runs on simulated sessions of several sizes, each four times the size before.
 
 For each size the program prints, as medians:
 
@@ -11,7 +11,7 @@ Then follow the growth of the time with the number of points, and the rates of t
 (:mod:`tools.bench_kernels`). Machines differ and run other programs as well: rounds of different sizes take turns, and
 ratios are more reliable than times.
 
-    python -m tools.bench [--sizes small medium large huge] [--repeats 5] [--jobs 2]
+    python -m tools.bench [--sizes small medium large huge long] [--repeats 5] [--jobs 2]
 """
 
 import argparse
@@ -34,17 +34,23 @@ FOLDER = Path("runs/bench")
 POOLCAL = [sys.executable, "-m", "stages.cli"]
 
 # The third has more than 20 million laser points and two million soundings. Each smaller one has a quarter of the next
-# larger: fewer and faster passes at the same rates of the instruments. The largest lasts half an hour.
+# larger: fewer and faster passes at the same rates of the instruments. Two have four times its points: one by faster
+# instruments, one by more passes, which last half an hour.
 PASSES_M = [4.0, 8.0, 5.0, 7.0, 4.5, 6.0, 5.5, 7.5]
-SIZES = {
-    "small": {"distances_m": PASSES_M[:2], "speed_m_s": 0.68},
-    "medium": {"distances_m": PASSES_M[:4], "speed_m_s": 0.34},
-    "large": {"distances_m": PASSES_M, "speed_m_s": 0.17},
-    "huge": {"distances_m": 4 * PASSES_M, "speed_m_s": 0.17},
-}
-INSTRUMENTS = {
+SLOW = {
     "laser": {"point_rate_hz": 120_000.0, "line_rate_hz": 120.0},
     "mbes": {"ping_rate_hz": 25.0},
+}
+FAST = {
+    "laser": {"point_rate_hz": 480_000.0, "line_rate_hz": 240.0},
+    "mbes": {"ping_rate_hz": 100.0},
+}
+SIZES: dict[str, dict[str, object]] = {
+    "small": {"track": {"distances_m": PASSES_M[:2], "speed_m_s": 0.68}, **SLOW},
+    "medium": {"track": {"distances_m": PASSES_M[:4], "speed_m_s": 0.34}, **SLOW},
+    "large": {"track": {"distances_m": PASSES_M, "speed_m_s": 0.17}, **SLOW},
+    "huge": {"track": {"distances_m": PASSES_M, "speed_m_s": 0.17}, **FAST},
+    "long": {"track": {"distances_m": 4 * PASSES_M, "speed_m_s": 0.17}, **SLOW},
 }
 DECODE = """
 import sys
@@ -98,7 +104,7 @@ def session_of(size: str) -> Path:
     if not folder.exists():
         FOLDER.mkdir(parents=True, exist_ok=True)
         scenario = FOLDER / f"{size}.yaml"
-        scenario.write_text(yaml.safe_dump({"name": size, "track": SIZES[size], **INSTRUMENTS}))
+        scenario.write_text(yaml.safe_dump({"name": size, **SIZES[size]}))
         command = [*POOLCAL, "simulate", str(folder), "--scenario", str(scenario)]
         subprocess.run(command, check=True, capture_output=True)
     return folder

@@ -3,6 +3,8 @@
 Only this module and the simulator's ray caster import open3d.
 """
 
+import sys
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -14,6 +16,23 @@ Array = NDArray[np.float64]
 THREADS = 2  # points are independent of each other, so the number does not change the result
 
 
+def _open3d() -> Any:
+    """Return open3d, without the pages for a browser that its import brings: they take more than half of its time."""
+    pages = "open3d.visualization.draw_plotly"
+    if "open3d" in sys.modules or pages in sys.modules:
+        import open3d
+
+        return open3d
+    stand_in = ModuleType(pages)
+    vars(stand_in).update(dict.fromkeys(("get_plotly_fig", "draw_plotly", "draw_plotly_server")))
+    sys.modules[pages] = stand_in
+    try:
+        import open3d
+    finally:
+        del sys.modules[pages]
+    return open3d
+
+
 class ClosestSurface:
     """Finder of the nearest points on a target model's faces. A call returns points (n, 3) m and face numbers (n,).
 
@@ -21,9 +40,7 @@ class ClosestSurface:
     """
 
     def __init__(self, model: TargetModel) -> None:
-        import open3d  # the import takes half a second
-
-        o3d: Any = open3d
+        o3d = _open3d()  # late: it takes half a second
         vertices, triangles = model.triangles()
         self._tensor = o3d.core.Tensor
         self._scene = o3d.t.geometry.RaycastingScene(nthreads=1)
