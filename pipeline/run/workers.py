@@ -8,10 +8,13 @@ copied between workers, and no process is left when the program is killed. Resul
 do not depend on the number of workers.
 """
 
+import concurrent.futures
 import contextlib
 import itertools
+import logging
 import os
 import threading
+import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
@@ -22,11 +25,16 @@ from pipeline.artefacts.streams import Mapper, serial
 from pipeline.errors import ConfigError
 
 T = TypeVar("T")
+WATCH_S, WAIT_S = 1.0, 60.0  # how often the workers of a cluster are counted, and how long a run waits for a new one
 _inside = threading.local()
 
 
 class Stopped(Exception):
     """The run has failed or was interrupted elsewhere: this ends the work on one part, and never reaches the caller."""
+
+
+class NoWorkers(ConfigError):
+    """A cluster that has lost all its workers, or its scheduler."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +44,7 @@ class Workers:
     jobs: int
     executor: Executor | None = None  # None: this thread
     local: bool = True  # whether functions see this process's memory
+    watch: Callable[[], None] = lambda: None  # raises an error if no worker is left; called while results are awaited
     stop: threading.Event = field(default_factory=threading.Event)
 
     @property
@@ -61,6 +70,7 @@ class Workers:
             for arguments in itertools.islice(work, 2 * self.jobs):
                 waiting.append(executor.submit(call, function, arguments))
             while waiting:
+                self._wait(waiting[0])
                 result = waiting[0].result()
                 waiting.popleft()
                 for arguments in itertools.islice(work, 1):
@@ -68,6 +78,12 @@ class Workers:
                 yield result
         finally:
             self._abandon(waiting)
+
+    def _wait(self, future: Future[Any]) -> None:
+        """Wait until a task has ended. Nobody else would notice that the last worker of a cluster has ended."""
+        while not future.done():
+            concurrent.futures.wait([future], timeout=None if self.local else WATCH_S)
+            self.watch()
 
     def _abandon(self, waiting: deque[Future[T]]) -> None:
         """Cancel the tasks that have not begun, stop the others, and wait until all have ended.
@@ -81,9 +97,10 @@ class Workers:
         for future in waiting:
             if self.local:
                 future.cancel()
-        for future in waiting:
-            if not future.cancelled():
-                future.exception()
+        with contextlib.suppress(NoWorkers):  # then nothing is left that could write
+            for future in waiting:
+                if not future.cancelled():
+                    self._wait(future)
         self.stop.clear()
 
 
@@ -122,17 +139,59 @@ def workers(jobs: int | None = None, address: str | None = None) -> Iterator[Wor
 
 def _cluster(address: str) -> Iterator[Workers]:
     try:
-        from distributed import Client  # an optional extra
+        from distributed import CancelledError, Client, KilledWorker  # an optional extra
+        from distributed.comm import CommClosedError
     except ImportError as error:
         raise ConfigError(
             f"--executor {address}: dask.distributed is not installed; install poolcal with its extra 'dask'"
         ) from error
+    for name in ("distributed", "distributed.client"):  # what ends is said once, in one line
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         client: Any = Client(address, timeout=10)
     except (OSError, ValueError) as error:
         raise ConfigError(f"--executor {address}: no scheduler answers ({error}); check the address") from error
+    watched = _Watched(address, client)
     with client:
-        jobs = sum(client.ncores().values())
-        if not jobs:
+        if not watched.cores():
             raise ConfigError(f"--executor {address}: the scheduler has no workers; start some")
-        yield Workers(jobs, client.get_executor(pure=False), local=False)
+        try:
+            yield Workers(watched.cores(), client.get_executor(pure=False), local=False, watch=watched.check)
+        except KilledWorker as error:
+            raise ConfigError(
+                f"--executor {address}: worker after worker ended at the same work; look at their logs, they may lack "
+                "memory, and run again"
+            ) from error
+        except (CancelledError, CommClosedError) as error:
+            raise watched.without_scheduler() from error
+
+
+class _Watched:
+    """A cluster's workers, and since when there has been none."""
+
+    def __init__(self, address: str, client: Any) -> None:
+        self._address, self._client = address, client
+        self._none_since: float | None = None
+
+    def cores(self) -> int:
+        """Return the number of the workers' cores."""
+        return sum(self._client.ncores().values())
+
+    def check(self) -> None:
+        """Raise an error if there has been no worker for WAIT_S, or if the scheduler does not answer."""
+        now = time.monotonic()
+        try:
+            if self.cores():
+                self._none_since = None
+                return
+        except OSError as error:
+            raise self.without_scheduler() from error
+        self._none_since = now if self._none_since is None else self._none_since
+        if now - self._none_since > WAIT_S:
+            raise NoWorkers(f"--executor {self._address}: its last worker has ended; start workers, and run again")
+
+    def without_scheduler(self) -> NoWorkers:
+        """Return the error of a scheduler that does not answer."""
+        return NoWorkers(
+            f"--executor {self._address}: the scheduler has ended; start it and its workers, and run again"
+        )
