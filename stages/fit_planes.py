@@ -33,6 +33,7 @@ from pipeline.mount import mount_of
 Array = NDArray[np.float64]
 Key = tuple[int, int]  # pass, face
 NamedKey = tuple[int, str]  # pass, name of a face or a family
+BLOCK = 16_384  # number of soundings that are lifted at a time: 5 MB
 
 
 @dataclass(frozen=True)
@@ -109,9 +110,14 @@ def sounding_moments(batch: Batch, trajectory: Trajectory, R_body_from_mbes: Arr
         Coarse rotation (3, 3) of the sonar.
     """
     points = point_array(batch, "mbes_m") @ R_body_from_mbes.T
-    positions, R_target_from_body = trajectory.poses_at(batch["t_ns"])
-    features = lift(R_target_from_body, positions, points)
-    return {key: features[rows].T @ features[rows] for key, rows in _rows_by_key(batch)}
+    moments: dict[Key, Array] = {}
+    for key, of_key in _rows_by_key(batch):
+        for start in range(0, len(of_key), BLOCK):
+            rows = of_key[start : start + BLOCK]
+            positions, R_target_from_body = trajectory.poses_at(batch["t_ns"][rows])
+            lifted = lift(R_target_from_body, positions, points[rows])
+            moments[key] = moments.get(key, 0.0) + lifted.T @ lifted
+    return moments
 
 
 def _merge(partials: Iterator[dict[Key, Any]]) -> dict[Key, Any]:

@@ -63,7 +63,7 @@ class IntervalSums:
         """Return the weighted mean of s in each interval (g,)."""
         return np.asarray(self.swept[:, 0, 0] / self.normal[:, 0, 0])
 
-    def selected(self, rows: Integers) -> "IntervalSums":
+    def selected(self, rows: Integers | slice) -> "IntervalSums":
         """Return the intervals in these rows."""
         return IntervalSums(**{name: getattr(self, name)[rows] for name in self.__dataclass_fields__})
 
@@ -167,6 +167,15 @@ def interval_sums(points: LinearisedPoints) -> IntervalSums:
         squared_count=total(count**2),
     )
     return merged([sums.selected(np.flatnonzero(normal[:, 0, 0] > 0))])
+
+
+def joined(pieces: Iterable[IntervalSums]) -> IntervalSums:
+    """Return intervals one piece after the other; there is one piece at least.
+
+    Pieces to which nothing else refers give their memory back one field after the other.
+    """
+    parts = [dict(vars(piece)) for piece in pieces]
+    return IntervalSums(**{name: np.concatenate([part.pop(name) for part in parts]) for name in list(parts[0])})
 
 
 def merged(pieces: Iterable[IntervalSums]) -> IntervalSums:
