@@ -3,6 +3,7 @@
 import os
 import shutil
 import subprocess
+import sys
 
 import pytest
 
@@ -45,6 +46,18 @@ def test_twice_does_nothing(done: Place, right: dict[str, str]) -> None:
     assert told.err == "".join(f"{name}: up to date\n" for name in ORDER)
     assert told.status == 0
     assert digests(done.run) == right
+
+
+def test_the_second_time_nothing_is_imported_that_computes_or_draws(done: Place) -> None:
+    words = [*map(str, done.words()), "--no-report", "--no-recordings"]
+    code = (
+        f"import sys; from stages.cli import call; status = call({words});"
+        "heavy = {'scipy', 'numba', 'open3d', 'matplotlib', 'rerun', 'jinja2', 'laspy'} & set(sys.modules);"
+        "sys.exit(f'imported {heavy}' if heavy else status)"
+    )
+    told = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert told.returncode == 0, told.stderr
+    assert told.stderr.count(": up to date") == len(ORDER)
 
 
 @pytest.mark.parametrize(
