@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
-from pipeline.adjustment.point_sums import summed
+from pipeline.adjustment.point_sums import COLUMNS, summed
 from pipeline.artefacts.streams import Batch, Stream
 from pipeline.maths.adjustment.interval_sums import IntervalSums, merged
 from pipeline.maths.adjustment.parameters import State
@@ -104,7 +104,7 @@ def accumulate(streams: Mapping[str, Stream], model: ObservationModel, values: C
     sums, groups = {}, dict[Group, GroupStatistics]()
     for sensor, stream in streams.items():
         pieces = []
-        for piece, statistics in stream.fold(_accumulate_batch, model, sensor, values):
+        for piece, statistics in stream.only(COLUMNS[sensor]).fold(_accumulate_batch, model, sensor, values):
             pieces.append(piece)
             for key, group in statistics.items():
                 groups[key] = groups[key] + group if key in groups else group

@@ -24,6 +24,10 @@ from pipeline.maths.kernels.sounding_sums import SonarPoses, sum_soundings
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
+COLUMNS = {  # of the labelled points that the sums need, by sensor
+    "laser": ("t_ns", "face", *(f"{axis}_{frame}_m" for frame in ("laser", "target") for axis in "xyz"), "edge_weight"),
+    "mbes": ("t_ns", "face", *(f"{axis}_mbes_m" for axis in "xyz"), "edge_weight"),
+}
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ stretch of a raw file, or (in series of simulated sessions, and in tests) a batc
 tuple of parts that can be read any number of times.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
@@ -127,6 +127,12 @@ class Stream:
     parts: tuple[Part, ...]
     mapper: Mapper = serial
     here: Mapper = serial  # spreads work on the memory of this process
+
+    def only(self, columns: Sequence[str]) -> "Stream":
+        """Return the stream with these columns alone, where it is read from files."""
+        wanted = tuple(columns)
+        files = (replace(part, columns=wanted) if isinstance(part, ParquetPart) else part for part in self.parts)
+        return replace(self, parts=tuple(files))
 
     def batches(self) -> Iterator[Batch]:
         """Yield all rows in order, batch by batch, with one batch in memory."""

@@ -115,7 +115,7 @@ def test_no_points(adjusted: Case, sensor: str) -> None:
 
 
 @given(first=st.integers(0, 5000), count=st.integers(1, 60), step=st.integers(1, 40))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 def test_any_few_points(adjusted: Case, sensor: str, first: int, count: int, step: int) -> None:
     """From one point on: whatever surfaces, intervals and weights are among them."""
     batches, model, values = adjusted

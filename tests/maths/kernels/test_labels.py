@@ -45,7 +45,7 @@ def finite(beams: TargetBeams) -> TargetBeams:
 
 @pytest.mark.parametrize("sensor", ["laser", "sonar", "averages"])
 @given(seed=st.integers(0, 2**32), points=st.integers(0, 80))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 def test_labels_are_those_of_numpy(sensor: str, seed: int, points: int) -> None:
     rng = np.random.default_rng(seed)
     places = near_the_target(rng, points)
@@ -66,7 +66,7 @@ def test_labels_are_those_of_numpy(sensor: str, seed: int, points: int) -> None:
 
 
 @given(seed=st.integers(0, 2**32), points=st.integers(0, 80), seen=st.sampled_from(["dry", "wet", "both"]))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 def test_points_near_planes_are_those_of_numpy(seed: int, points: int, seen: str) -> None:
     rng = np.random.default_rng(seed)
     places, among = near_the_target(rng, points), rng.random(points) < 0.8

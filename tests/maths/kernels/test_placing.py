@@ -24,7 +24,7 @@ def moving(rng: np.random.Generator, records: int, turn: float) -> Trajectory:
 
 
 @given(**SHAPE, turn=TURNS, ordered=st.booleans(), sparse=st.booleans())
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=50, deadline=None)
 def test_points_are_where_numpy_places_them(
     seed: int, records: int, points: int, turn: float, ordered: bool, sparse: bool
 ) -> None:
@@ -45,7 +45,7 @@ def test_points_are_where_numpy_places_them(
 
 
 @given(**SHAPE, turn=TURNS, knots=st.integers(1, 30))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=50, deadline=None)
 def test_poses_are_those_of_numpy(seed: int, records: int, points: int, turn: float, knots: int) -> None:
     rng = np.random.default_rng(seed)
     body = BodyMotion.of(moving(rng, records, turn), np.zeros(3))

@@ -24,7 +24,7 @@ def by_numpy(given_residuals: BinnedResiduals) -> tuple[np.ndarray, np.ndarray, 
     spans=st.tuples(*[st.sampled_from([1, 3, 1000])] * 2, st.sampled_from([1, 50, 10**9])),
     batches=st.integers(1, 4),
 )
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=50, deadline=None)
 def test_sums_are_those_of_numpy(seed: int, points: int, spans: tuple[int, ...], batches: int) -> None:
     rng = np.random.default_rng(seed)
     numbers = [rng.integers(-span, span, points) for span in spans]
