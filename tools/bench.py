@@ -82,10 +82,12 @@ from pathlib import Path
 from pipeline.run import runner
 from pipeline.run.workers import workers
 from stages import load
+from stages.commands.entry import prepare_process
 def now():
     usages = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return time.perf_counter(), sum(u.ru_utime + u.ru_stime for u in usages), usages[0].ru_maxrss / 1024
 session, run, jobs = Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3])
+prepare_process()
 modules = load()
 with workers(jobs, None) as pool:
     last = now()
@@ -187,6 +189,8 @@ def growth(results: dict[str, dict[str, float]]) -> str:
     """Return by which power of the number of points the time of the whole run grows, from size to size."""
     lines = []
     for (small, a), (large, b) in combinations(results.items(), 2):
+        if b["points"] < 2 * a["points"]:
+            continue
         power = math.log(b["run: s"] / a["run: s"]) / math.log(b["points"] / a["points"])
         lines.append(f"{small} to {large}: time grows as points to the power {power:.2f}")
     return "\n".join(lines)
