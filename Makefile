@@ -112,7 +112,7 @@ test: lint ## lint, then every test
 thorough: lint ## every test, with more draws, kills and damaged files than a usual run has
 	POOLCAL_THOROUGH=1 $(PY) -m pytest -n 2 --dist loadfile -q
 
-bench: $(SETUP) ## time and memory of whole runs of three sizes, against bare decoding
+bench: $(SETUP) ## time and memory of whole runs of several sizes, against bare decoding
 	$(PY) -m tools.bench
 
 pictures: $(DEMO)/.simulated ## the documents' pictures, anew (after make setup-visual)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
 from pipeline.adjustment.point_sums import COLUMNS, summed
 from pipeline.artefacts.streams import Batch, Stream
-from pipeline.maths.adjustment.interval_sums import IntervalSums, merged
+from pipeline.maths.adjustment.interval_sums import IntervalSums, let_go, merged
 from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.robust_weights import LEAST_SCALE, robust_scale
 from pipeline.maths.adjustment.weighting import Weighting, edge_shares, rescaled, scatter, shrunk_factors
@@ -108,7 +108,7 @@ def accumulate(streams: Mapping[str, Stream], model: ObservationModel, values: C
             pieces.append(piece)
             for key, group in statistics.items():
                 groups[key] = groups[key] + group if key in groups else group
-        sums[sensor] = merged(pieces.pop(0) for _ in range(len(pieces)))
+        sums[sensor] = merged(let_go(pieces))
     return Accumulation(sums, groups)
 
 

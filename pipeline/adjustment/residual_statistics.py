@@ -18,7 +18,7 @@ from pipeline.artefacts.streams import Batch, Stream, point_array
 from pipeline.config.pool import Adjust
 from pipeline.gps_time import NS
 from pipeline.maths.adjustment.design_matrix import FLATTEST
-from pipeline.maths.adjustment.interval_sums import IntervalSums, merged
+from pipeline.maths.adjustment.interval_sums import IntervalSums, let_go, merged
 from pipeline.maths.adjustment.mean_tests import normal_deviates
 from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.pose_errors import drift_between_passes
@@ -114,7 +114,7 @@ def residual_statistics(
             by_face.append(face_sums)
             for variable, sums in sums_by_variable.items():
                 pieces.setdefault(variable, []).append(sums)
-        sums_by_face[sensor] = merged(by_face.pop(0) for _ in range(len(by_face)))
+        sums_by_face[sensor] = merged(let_go(by_face))
         for variable, parts in pieces.items():
             sums = merged_residual_sums(parts)
             if variable == "pass":

@@ -7,11 +7,12 @@ may write one text in place of batches: its length as int64, and the text in UTF
 RawDataError of the file.
 """
 
+import contextlib
+import fcntl
 import struct
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
@@ -21,7 +22,7 @@ from numpy.typing import NDArray
 from pipeline.errors import RawDataError
 
 REMEDY = "copy or export it again"
-PIPE_BYTES = 1 << 20  # as much as Linux allows: both processes wait for each other less often
+PIPE_BYTES = 1 << 20  # as much as Linux usually allows: both processes wait for each other less often
 DecodedColumns = tuple[NDArray[np.float64], ...]
 
 
@@ -83,14 +84,16 @@ def decoded_text(program: Path, arguments: list[str], name: str, most: int) -> s
         return _exactly(stream, _count(stream, name, most), name).decode("utf-8", "replace")
 
 
-@contextmanager
+@contextlib.contextmanager
 def _started(program: Path, arguments: list[str]) -> Iterator[IO[bytes]]:
     command = [sys.executable, "-P", str(program), *arguments]
     with subprocess.Popen(
-        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, pipesize=PIPE_BYTES
+        command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
     ) as worker:
         try:
             assert worker.stdout is not None
+            with contextlib.suppress(OSError, AttributeError):  # systems and users have limits; a small pipe will do
+                fcntl.fcntl(worker.stdout, fcntl.F_SETPIPE_SZ, PIPE_BYTES)
             yield worker.stdout
         finally:
             worker.kill()

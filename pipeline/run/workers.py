@@ -83,7 +83,8 @@ class Workers:
         """Wait until a task has ended. Nobody else would notice that the last worker of a cluster has ended."""
         while not future.done():
             concurrent.futures.wait([future], timeout=None if self.local else WATCH_S)
-            self.watch()
+            if not future.done():
+                self.watch()
 
     def _abandon(self, waiting: deque[Future[T]]) -> None:
         """Cancel the tasks that have not begun, stop the others, and wait until all have ended.

@@ -132,3 +132,13 @@ def test_worker_ends_with_its_reader(content: bytes, tmp_path: Path) -> None:
     chunks = part.chunks()
     assert len(next(chunks).columns["t_ns"])
     chunks.close()
+
+
+def test_where_a_wide_pipe_is_not_allowed_a_small_one_will_do(
+    content: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(*_: object) -> None:
+        raise PermissionError("the user's pipes are full")
+
+    monkeypatch.setattr("pipeline.readers.decoder_process.fcntl.fcntl", refused)
+    assert sum(len(chunk.columns["t_ns"]) for chunk in read(tmp_path / "a.laz", content)) == COUNT

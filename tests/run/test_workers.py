@@ -2,12 +2,14 @@
 
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
 from pipeline.artefacts.streams import MemoryPart, Stream
 from pipeline.errors import ConfigError, RawDataError
-from pipeline.run.workers import SERIAL, Workers, default_jobs, workers
+from pipeline.run import workers as module
+from pipeline.run.workers import SERIAL, NoWorkers, Workers, default_jobs, workers
 
 
 def test_results_come_in_order() -> None:
@@ -91,3 +93,49 @@ def test_a_cluster_without_its_library_or_scheduler_is_one_line() -> None:
     refusal = r"dask.distributed is not installed|no scheduler answers"
     with pytest.raises(ConfigError, match=refusal), workers(address="tcp://127.0.0.1:9"):
         pass
+
+
+class Client:
+    """A cluster's client, whose workers' cores are the next of a list; an error instead of a number is raised."""
+
+    def __init__(self, *cores: int | OSError) -> None:
+        self._cores = list(cores)
+
+    def ncores(self) -> dict[str, int]:
+        cores = self._cores.pop(0)
+        if isinstance(cores, OSError):
+            raise cores
+        return {"tcp://a:1": cores} if cores else {}
+
+
+def test_a_cluster_without_workers_is_waited_for_and_then_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    seconds = iter([0.0, 50.0, 70.0, 80.0, 139.0, 141.0])
+    monkeypatch.setattr(module.time, "monotonic", lambda: next(seconds))
+    watched = module._Watched("tcp://s:1", Client(0, 0, 2, 0, 0, 0))  # at 70 s a worker is there again
+    for _ in range(5):
+        watched.check()
+    with pytest.raises(NoWorkers, match=r"tcp://s:1: its last worker has ended; start workers"):
+        watched.check()
+
+
+def test_a_scheduler_that_does_not_answer_ends_the_run() -> None:
+    with pytest.raises(NoWorkers, match="the scheduler has ended; start it"):
+        module._Watched("tcp://s:1", Client(OSError("timed out"))).check()
+
+
+def test_work_that_nobody_does_any_more_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "WATCH_S", 0.01)
+    free = threading.Event()
+
+    def watch() -> None:
+        raise NoWorkers("none")
+
+    def work(_: int) -> bool:
+        return free.wait(30)
+
+    with ThreadPoolExecutor(1) as executor:
+        begin = time.monotonic()
+        with pytest.raises(NoWorkers):
+            list(Workers(1, executor, local=False, watch=watch).map(work, range(5)))
+        assert time.monotonic() - begin < 5
+        free.set()

@@ -21,7 +21,7 @@ pose error acts. (With the mean of s instead, the mean normalised squared error 
 8.3.)
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -176,6 +176,12 @@ def joined(pieces: Iterable[IntervalSums]) -> IntervalSums:
     """
     parts = [dict(vars(piece)) for piece in pieces]
     return IntervalSums(**{name: np.concatenate([part.pop(name) for part in parts]) for name in list(parts[0])})
+
+
+def let_go(pieces: list[IntervalSums]) -> Iterator[IntervalSums]:
+    """Yield the pieces one by one and keep none, so that :func:`merged` can give their memory back."""
+    while pieces:
+        yield pieces.pop(0)
 
 
 def merged(pieces: Iterable[IntervalSums]) -> IntervalSums:
