@@ -153,7 +153,7 @@ def adjust_mount(
     """
     prior = problem.prior
     figures, ping = DriftFigures.of_session(prior.noise), None
-    weighted = _weighted_iteration(problem, streams, settings, gap_s)
+    weighted = weighted_iteration(problem, streams, settings, gap_s)
     # parameters that the points tell of, and that are known beforehand, are estimated with the last weights
     last, estimated = weighted.last, np.union1d(weighted.estimated, prior.known_parameters)
     factors: dict[str, EpochVarianceFactor] = {}
@@ -195,7 +195,7 @@ def adjust_mount(
 
 
 @dataclass(frozen=True)
-class _WeightedIteration:
+class WeightedIteration:
     """The iteration after its last reading of the points; ``deficient``: the data leave directions open."""
 
     last: Iterate
@@ -207,10 +207,13 @@ class _WeightedIteration:
     iterations: int
 
 
-def _weighted_iteration(
+def weighted_iteration(
     problem: CalibrationProblem, streams: Mapping[str, Stream], settings: IterationSettings, gap_s: float
-) -> _WeightedIteration:
-    """Read all points, solve and step, until the weights do not change, or a direction is open."""
+) -> WeightedIteration:
+    """Read all points, solve and step, until the weights do not change, or a direction is open.
+
+    Parameters: as for :func:`adjust_mount`.
+    """
     model, prior = problem.model, problem.prior
     state = initial_mount(streams["mbes"], model) if "mbes" in streams else model.coarse
     values = CurrentValues(state, weighting=Weighting(white=prior.noise.white))
@@ -228,7 +231,7 @@ def _weighted_iteration(
         deficient = solution.deficiency > 0
         settled = weighting.robust is not None and _is_small(solution, SETTLED)
         if deficient or (settled and iteration >= LEAST_PASSES) or iteration >= settings.max_iterations:
-            return _WeightedIteration(
+            return WeightedIteration(
                 last=start if deficient else stepped,
                 estimated=estimated,
                 weighting=weighting,

@@ -17,7 +17,16 @@ from pipeline.maths.adjustment.normal_equations import residual_shift
 from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.robust_weights import BINS
 from pipeline.maths.adjustment.weighting import Weighting
-from pipeline.maths.kernels.interval_group import FIRST_BIN, OBSERVED, Noise, Points, Records, Sums, Surfaces
+from pipeline.maths.kernels.interval_group import (
+    FIRST_BIN,
+    OBSERVED,
+    Noise,
+    Points,
+    Records,
+    Sums,
+    Surfaces,
+    scratch,
+)
 from pipeline.maths.kernels.interval_slots import slots_of
 from pipeline.maths.kernels.laser_sums import LaserPoses, sum_laser_points
 from pipeline.maths.kernels.sounding_sums import SonarPoses, sum_soundings
@@ -62,7 +71,8 @@ class _Slots:
         record, slot, record_of, surface_of = np.empty((4, len(t_ns)), dtype=np.int64)
         t_ns, record_ns = (np.require(times, np.int64, ("C", "W")) for times in (t_ns, record_ns))
         share = np.empty(len(t_ns))
-        number = slots_of(t_ns, surface, record_ns, surfaces, record, share, slot, record_of, surface_of)
+        last = np.empty(surfaces, dtype=np.int64)
+        number = slots_of(t_ns, surface, record_ns, record, share, slot, record_of, surface_of, last)
         return cls(record, share, slot, record_of[:number].copy(), surface_of[:number].copy())  # views would keep all
 
 
@@ -110,11 +120,12 @@ def summed(
     )
     noise = _noise(model, sensor, values.weighting, surfaces)
     sums = _empty_sums(len(slots.record_of), surfaces, features, len(surface) if residuals else 0)
+    memory = scratch(of_points.record, surfaces, features)
     if sensor == "laser":
         poses = _laser_poses(points, model, state, slice(first, first + len(errors.record)))
-        sum_laser_points(of_points, poses, of_records, of_surfaces, noise, sums)
+        sum_laser_points(of_points, poses, of_records, of_surfaces, noise, sums, memory)
     else:
-        sum_soundings(of_points, _sonar_poses(points, model, state), of_records, of_surfaces, noise, sums)
+        sum_soundings(of_points, _sonar_poses(points, model, state), of_records, of_surfaces, noise, sums, memory)
     return SummedBatch(
         sums=_interval_sums(slots, sums),
         statistics=sums.statistics,
@@ -173,7 +184,6 @@ def _noise(model: ObservationModel, sensor: str, weighting: Weighting, surfaces:
 def _empty_sums(slots: int, surfaces: int, features: int, observed: int) -> Sums:
     return Sums(
         statistics=np.zeros((surfaces, FIRST_BIN + len(BINS) - 1)),
-        means=np.zeros((surfaces, 2)),
         normal=np.zeros((slots, features, features)),
         swept=np.zeros((slots, N_MOVED, features)),
         swept_twice=np.zeros((slots, N_MOVED, N_MOVED)),

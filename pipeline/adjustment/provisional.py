@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from pipeline.adjustment.iteration import IterationSettings, MountAdjustment, adjust_mount
+from pipeline.adjustment.iteration import IterationSettings, WeightedIteration, weighted_iteration
 from pipeline.adjustment.problem import CalibrationProblem, designed_planes
 from pipeline.artefacts.sampling import sample_rows
 from pipeline.artefacts.streams import Batch, MemoryPart, Stream, point_array
@@ -108,8 +108,8 @@ def with_adjusted_sample(
         if number < ROUNDS:  # enough to label by: white noise of single records takes half the time
             noise = replace(problem.prior.noise, white=np.zeros(N_POSE))
             problem = replace(problem, prior=replace(problem.prior, noise=noise))
-        adjustment = adjust_mount(problem, labelled, settings, gap_s)
-        if not adjustment.converged:
+        adjustment = weighted_iteration(problem, labelled, settings, gap_s)
+        if adjustment.deficient or not adjustment.settled:
             continue
         corrected = corrected_context(context, adjustment)
         relabelled = labelled_sample(sample, corrected)
@@ -158,17 +158,17 @@ def labelled_sample(sample: Mapping[str, Batch], context: LabellingContext) -> d
     return streams
 
 
-def corrected_context(context: LabellingContext, adjustment: MountAdjustment) -> LabellingContext:
+def corrected_context(context: LabellingContext, adjustment: WeightedIteration) -> LabellingContext:
     """Return the context with the adjusted mount, and the trajectory without drift, relative to the adjusted target.
 
     Labels are made with the faces as designed. So the adjusted surfaces are brought onto the design: with the
     displacement g = (d, ω) of the surfaces from the design, a point X of the adjusted target is Exp(-ω) (X - d) of the
     designed one.
     """
-    state, coarse = adjustment.state, context.coarse_mount
+    state, coarse = adjustment.last.linearisation.state, context.coarse_mount
     g = displacement(state.surfaces, designed_planes(context.model))
     R_design_from_adjusted = exp_so3(-g[3:])
-    trajectory = adjustment.drift.corrected(context.trajectory)
+    trajectory = adjustment.last.drift.corrected(context.trajectory)
     mount = replace(
         context.mount,
         rotation_vector_rad=log_so3(state.R_body_from_sensor @ coarse.R_body_from_sensor.T),

@@ -8,7 +8,7 @@ tuple of parts that can be read any number of times.
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 import pyarrow as pa
@@ -65,6 +65,20 @@ class Part(Protocol):
         ...
 
 
+@runtime_checkable
+class PartByColumns(Part, Protocol):
+    """A part that can be read without the columns that are not needed."""
+
+    def only(self, columns: tuple[str, ...]) -> Part:
+        """Return the part with these columns alone."""
+        ...
+
+
+def only(part: Part, columns: tuple[str, ...]) -> Part:
+    """Return a part with these columns alone, if it can be read so; else as it is."""
+    return part.only(columns) if isinstance(part, PartByColumns) else part
+
+
 @dataclass(frozen=True)
 class ParquetPart:
     """One Parquet file of a stream in a run folder."""
@@ -76,6 +90,10 @@ class ParquetPart:
     def name(self) -> str:
         """Name of the file."""
         return self.path.name
+
+    def only(self, columns: tuple[str, ...]) -> "ParquetPart":
+        """Return the part with these columns alone."""
+        return replace(self, columns=columns)
 
     def chunks(self) -> Iterator[Chunk]:
         """Yield the rows, at most BATCH_ROWS at a time."""
@@ -130,9 +148,7 @@ class Stream:
 
     def only(self, columns: Sequence[str]) -> "Stream":
         """Return the stream with these columns alone, where it is read from files."""
-        wanted = tuple(columns)
-        files = (replace(part, columns=wanted) if isinstance(part, ParquetPart) else part for part in self.parts)
-        return replace(self, parts=tuple(files))
+        return replace(self, parts=tuple(only(part, tuple(columns)) for part in self.parts))
 
     def batches(self) -> Iterator[Batch]:
         """Yield all rows in order, batch by batch, with one batch in memory."""

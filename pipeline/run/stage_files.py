@@ -1,14 +1,14 @@
 """Read a stage's inputs from the run folder and the raw files, and write its outputs."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from pipeline.artefacts import parquet
 from pipeline.artefacts.schema import Artefact, Document, Provenance, RawFiles
-from pipeline.artefacts.streams import EMPTY_STREAM, Chunk, ParquetPart, Part, Stream
+from pipeline.artefacts.streams import EMPTY_STREAM, Chunk, ParquetPart, Part, Stream, only
 from pipeline.atomic_files import write_text, writing
 from pipeline.readers import dispatch
 from pipeline.run import manifest, provenance
@@ -69,6 +69,9 @@ class _Watched:
     @property
     def name(self) -> str:
         return self.part.name
+
+    def only(self, columns: tuple[str, ...]) -> "_Watched":
+        return replace(self, part=only(self.part, columns))
 
     def chunks(self) -> Iterator[Chunk]:
         for chunk in self.part.chunks():

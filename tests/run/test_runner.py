@@ -227,3 +227,16 @@ def test_run_yaml_is_what_the_stages_are_run_with(pool: Pool) -> None:
     pool.config.unlink()
     (pool.session / "session.yaml").unlink()
     assert not runner.run_stage(pool.stages, "sift", pool.run_folder)
+
+
+@pytest.mark.parametrize("local", [True, False])
+def test_a_stage_that_wants_one_column_of_its_files_reads_that_alone(pool: Pool, local: bool) -> None:
+    read = []
+
+    def prepare(inputs: toys.SiftInputs, config: toys.SiftConfig) -> float:
+        read.extend(sorted(batch) for batch in inputs.points.only(["x_m"]).batches())
+        return 1.0
+
+    pool.stages[1].prepare = prepare
+    pool.run(Workers(1, local=local))
+    assert read == [["x_m"], ["x_m"]]

@@ -5,7 +5,9 @@ other modules, and constants, are part of it. So the name of the code's file hol
 imported at the first call, because many commands call no such function.
 
 Numbers behave as numpy's: x / 0 is infinite, and raises nothing. Functions that are part of others are copied into
-them: a call would cost as much as the arithmetic. No formula is reordered (no fastmath).
+them: a call would cost as much as the arithmetic. No formula is reordered (no fastmath). Functions make no arrays: what
+they write, and scratch memory, are arguments. So numba need not count references to arrays (``_nrt``), which takes
+longer than the arithmetic of a loop whose parts look at rows of arrays.
 """
 
 import hashlib
@@ -22,7 +24,7 @@ from numpy.typing import NDArray
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 FOLDER = Path(__file__).parent
-LIKE_NUMPY: Any = {"nogil": True, "error_model": "numpy"}
+OPTIONS: Any = {"nogil": True, "error_model": "numpy", "_nrt": False}
 _LOCK = RLock()
 _FUNCTIONS: list["_Compiled"] = []
 
@@ -114,7 +116,7 @@ class _Part:
         from numba import njit
 
         if self._to_copy is None:
-            self._to_copy = njit(**LIKE_NUMPY, forceinline=True)(_with_parts(self.function))
+            self._to_copy = njit(**OPTIONS, forceinline=True)(_with_parts(self.function))
         return self._to_copy
 
 
@@ -142,9 +144,9 @@ class _Compiled:
                 function.__qualname__ = f"{function.__name__}-{digest}"  # part of the name of the code's file
                 signature = tuple(argument.numba_type() for argument in self._arguments)
                 try:
-                    self._code = njit(signature, **LIKE_NUMPY, cache=True)(function)
+                    self._code = njit(signature, **OPTIONS, cache=True)(function)
                 except RuntimeError:  # no folder for the file may be written
-                    self._code = njit(signature, **LIKE_NUMPY)(function)
+                    self._code = njit(signature, **OPTIONS)(function)
         return self._code
 
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.maths.kernels.compiled import CUBE, FLOAT, LINE, MATRIX, NUMBERS, compiled, named
+from pipeline.maths.kernels.compiled import CUBE, FLOAT, LINE, MATRIX, NUMBERS, block, compiled, named
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -75,15 +75,13 @@ class Noise(NamedTuple):
 class Sums(NamedTuple):
     """What is added to. g: number of slots; F: features q of the sensor.
 
-    statistics (s, 4 + bins): COUNT … FIRST_BIN; means (s, 2): Σ w, Σ w v of a group, scratch; normal (g, F, F),
-    swept (g, 3, F), swept_twice (g, 3, 3), right (g, F), right_swept (g, 3): see :class:`pipeline.maths.adjustment.
-    interval_sums.IntervalSums`; scalars (g, 3): Σ w v², Σ e, Σ e². Written: observed (6, n): of each point v, the
-    mean of the noise that was taken from it, the robust weight, the full weight without it, the normalised |v| (zero if
-    the robust weight is zero) and COSINE; or (6, 0): nothing.
+    statistics (s, 4 + bins): COUNT … FIRST_BIN; normal (g, F, F), swept (g, 3, F), swept_twice (g, 3, 3), right (g, F),
+    right_swept (g, 3): see :class:`pipeline.maths.adjustment.interval_sums.IntervalSums`; scalars (g, 3): Σ w v², Σ e,
+    Σ e². Written: observed (6, n): of each point v, the mean of the noise that was taken from it, the robust weight,
+    the full weight without it, the normalised |v| (zero if the robust weight is zero) and COSINE; or (6, 0): nothing.
     """
 
     statistics: Array
-    means: Array
     normal: Array
     swept: Array
     swept_twice: Array
@@ -93,14 +91,34 @@ class Sums(NamedTuple):
     observed: Array
 
 
+class Scratch(NamedTuple):
+    """Scratch memory: kept (m, k), a row for each point of a group; means (s, 2): Σ w, Σ w v of its points by surface.
+
+    q (F,): features of a point; vectors (3, 3): of the sensor's loop.
+    """
+
+    kept: Array
+    means: Array
+    q: Array
+    vectors: Array
+
+
 POINTS = named(Points, MATRIX, LINE, NUMBERS, LINE, NUMBERS, LINE, NUMBERS)
 RECORDS = named(Records, MATRIX, CUBE)
 SURFACES = named(Surfaces, CUBE, LINE)
 NOISE = named(Noise, LINE, LINE, LINE, FLOAT, FLOAT, LINE, FLOAT, FLOAT, FLOAT)
-SUMS = named(Sums, MATRIX, MATRIX, CUBE, CUBE, CUBE, MATRIX, MATRIX, MATRIX, MATRIX)
+SUMS = named(Sums, MATRIX, CUBE, CUBE, CUBE, MATRIX, MATRIX, MATRIX, MATRIX)
+SCRATCH = named(Scratch, MATRIX, MATRIX, LINE, MATRIX)
 
 
-@compiled()
+def scratch(record: Integers, surfaces: int, features: int) -> Scratch:
+    """Return the scratch memory for points with these records."""
+    columns = FEATURES + 2 * (features - 1)
+    kept = np.zeros((largest_group(block(record)), columns))
+    return Scratch(kept, np.empty((surfaces, 2)), np.empty(features), np.empty((3, 3)))
+
+
+@compiled((NUMBERS,))
 def largest_group(record: Integers) -> int:
     """Return the number of points of the largest group; at least 1."""
     largest, start = 1, 0
@@ -201,22 +219,20 @@ def _add_point(q: Array, v: float, s: float, w: float, g: int, sums: Sums) -> No
 
 
 @compiled()
-def add_group(first: int, end: int, points: Points, kept: Array, q: Array, sums: Sums) -> None:
-    """Add the points first to end to the sums of their slots, with the features at the adjusted points.
-
-    ``q`` (F,): scratch.
-    """
+def add_group(first: int, end: int, points: Points, scratch: Scratch, sums: Sums) -> None:
+    """Add the points first to end to the sums of their slots, with the features at the adjusted points."""
+    kept, means, q = scratch.kept, scratch.means, scratch.q
     features = len(q)
-    sums.means[:] = 0.0
+    means[:] = 0.0
     for p in range(first, end):
-        row, mean = kept[p - first], sums.means[points.surface[p]]
+        row, mean = kept[p - first], means[points.surface[p]]
         mean[0] += row[WEIGHT]
         mean[1] += row[WEIGHT] * row[V]
         if sums.observed.shape[1]:
             for k in range(len(OBSERVED)):
                 sums.observed[k, p] = row[OBSERVED[k]]
     for p in range(first, end):
-        row, mean = kept[p - first], sums.means[points.surface[p]]
+        row, mean = kept[p - first], means[points.surface[p]]
         w, v = row[WEIGHT], row[V]
         if w <= 0.0:
             continue

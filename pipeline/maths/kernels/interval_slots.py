@@ -7,16 +7,16 @@ A *slot* holds the sums of one interval, the points of one surface between two I
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.maths.kernels.compiled import INTEGER, LINE, NUMBERS, compiled
+from pipeline.maths.kernels.compiled import LINE, NUMBERS, compiled
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 
-@compiled((NUMBERS, NUMBERS, NUMBERS, INTEGER, NUMBERS, LINE, NUMBERS, NUMBERS, NUMBERS))
+@compiled((NUMBERS, NUMBERS, NUMBERS, NUMBERS, LINE, NUMBERS, NUMBERS, NUMBERS, NUMBERS))
 def slots_of(
-    t_ns: Integers, surface: Integers, record_ns: Integers, surfaces: int, record: Integers, share: Array,
-    slot: Integers, slot_record: Integers, slot_surface: Integers,
+    t_ns: Integers, surface: Integers, record_ns: Integers, record: Integers, share: Array, slot: Integers,
+    slot_record: Integers, slot_surface: Integers, last: Integers,
 ) -> int:  # fmt: skip
     """Write the record before each point, its share of the interval and its slot; return the number of slots.
 
@@ -26,14 +26,14 @@ def slots_of(
         Times of the points, ascending, and numbers of their surfaces.
     record_ns : (r,) array
         Times of the INS's records.
-    surfaces : int
-        Number of surfaces.
     record, share, slot : (n,) arrays
         Written: last record before each point (at most r - 2), its place from there to the next, 0 to 1, its slot.
     slot_record, slot_surface : (n,) arrays
         Written for each slot.
+    last : (s,) array
+        Scratch memory for each surface.
     """
-    last = np.full(surfaces, -1)
+    last[:] = -1
     k, found = 0, 0
     if len(t_ns):
         k = min(max(np.searchsorted(record_ns, t_ns[0], side="right") - 1, 0), len(record_ns) - 2)

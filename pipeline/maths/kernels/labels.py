@@ -53,9 +53,18 @@ class Labels(NamedTuple):
     reason: NDArray[np.int8]
 
 
+class Scratch(NamedTuple):
+    """Scratch memory: met (3,), foot (3,), spread (3, 3)."""
+
+    met: Array
+    foot: Array
+    spread: Array
+
+
 BEAMS = named(Beams, MATRIX, LINE, CUBE, LINE, FLOAT)
 LIMITS = named(Limits, *[FLOAT] * 8)
 LABELS = named(Labels, Block("int16", 1), LINE, LINE, Block("int8", 1))
+SCRATCH = named(Scratch, LINE, LINE, MATRIX)
 
 
 @compiled()
@@ -108,10 +117,12 @@ def _meet(
     return beams.range_m[i] - beyond
 
 
-@compiled((MATRIX, FLAGS, BEAMS, FACES, LIMITS, LABELS))
-def label(points_m: Array, among: Flags, beams: Beams, faces: FaceTables, limits: Limits, labels: Labels) -> None:
+@compiled((MATRIX, FLAGS, BEAMS, FACES, LIMITS, LABELS, SCRATCH))
+def label(
+    points_m: Array, among: Flags, beams: Beams, faces: FaceTables, limits: Limits, labels: Labels, scratch: Scratch
+) -> None:
     """Write the labels of points (3, n) in the target frame; ``among`` (n,): whether a point may have a label."""
-    met, foot, spread = np.empty(3), np.empty(3), np.empty((3, 3))
+    met, foot, spread = scratch
     d = beams.direction
     for i in range(points_m.shape[1]):
         labels.face[i], labels.cosine[i], labels.edge_weight[i] = -1, 0.0, 0.0

@@ -20,17 +20,18 @@ from pipeline.maths.kernels.interval_group import (
     NOISE,
     POINTS,
     RECORDS,
+    SCRATCH,
     SUMS,
     SURFACES,
     Noise,
     Points,
     Records,
+    Scratch,
     Sums,
     Surfaces,
     V,
     add_group,
     common_variance,
-    largest_group,
     mirror,
     turn_features,
     weigh,
@@ -52,17 +53,17 @@ class LaserPoses(NamedTuple):
 POSES = named(LaserPoses, LINE, MATRIX, MATRIX)
 
 
-@compiled((POINTS, POSES, RECORDS, SURFACES, NOISE, SUMS))
+@compiled((POINTS, POSES, RECORDS, SURFACES, NOISE, SUMS, SCRATCH))
 def sum_laser_points(
-    points: Points, poses: LaserPoses, records: Records, surfaces: Surfaces, noise: Noise, sums: Sums
-) -> None:
+    points: Points, poses: LaserPoses, records: Records, surfaces: Surfaces, noise: Noise, sums: Sums,
+    scratch: Scratch,
+) -> None:  # fmt: skip
     """Add the points to the sums of their slots, and to the statistics of their surfaces.
 
     Between two records the body moves along one straight step; the lever arm is that of the record before.
     """
     n = len(points.record)
-    kept, q = np.empty((largest_group(points.record), FEATURES + 2 * (F - 1))), np.empty(F)
-    r, ray = np.empty(3), np.empty(3)
+    kept, r, ray = scratch.kept, scratch.vectors[0], scratch.vectors[1]
     first = 0
     while first < n:
         k, end = points.record[first], first
@@ -92,6 +93,6 @@ def sum_laser_points(
             turn_features(row, r, records, k, A, s)
             row[COMMON] = common_variance(A, row[FEATURES], row[FEATURES + 1], share, noise.white)
             weigh(row, variance, s, noise, sums.statistics)
-        add_group(first, end, points, kept, q, sums)
+        add_group(first, end, points, scratch, sums)
         first = end
     mirror(sums)

@@ -32,6 +32,15 @@ class Drift(NamedTuple):
     values: Array
 
 
+class Scratch(NamedTuple):
+    """Scratch memory: error (6,), small (3, 3), turned (3, 3)."""
+
+    error: Array
+    small: Array
+    turned: Array
+
+
+SCRATCH = named(Scratch, LINE, MATRIX, MATRIX)
 RECORDS, DRIFT = named(Records, NUMBERS, MATRIX, CUBE, MATRIX), named(Drift, LINE, MATRIX)
 
 
@@ -66,10 +75,11 @@ def _write_product(A: Array, B: Array, product: Array) -> None:
             product[row, column] = A[row, 0] * B[0, column] + A[row, 1] * B[1, column] + A[row, 2] * B[2, column]
 
 
-@compiled((NUMBERS, LINE, RECORDS, DRIFT, MATRIX, CUBE))
+@compiled((NUMBERS, LINE, RECORDS, DRIFT, MATRIX, CUBE, SCRATCH))
 def pose_intervals(
-    record: Integers, share: Array, records: Records, drift: Drift, position_m: Array, R_frame_from_body: Array
-) -> None:
+    record: Integers, share: Array, records: Records, drift: Drift, position_m: Array, R_frame_from_body: Array,
+    scratch: Scratch,
+) -> None:  # fmt: skip
     """Write the poses of the body at shares of the intervals from record to record, corrected by the drift.
 
     Parameters
@@ -84,7 +94,7 @@ def pose_intervals(
         Written.
     """
     knots = len(drift.seconds)
-    error, small, turned = np.zeros(6), np.empty((3, 3)), np.empty((3, 3))
+    error, small, turned = scratch
     knot = 0
     for i in range(len(record)):
         k, s = record[i], share[i]
@@ -93,9 +103,10 @@ def pose_intervals(
             start = records.position_m[k, axis]
             position_m[i, axis] = start + s * (records.position_m[k + 1, axis] - start)
         _write_rotation(s * f[0], s * f[1], s * f[2], small)
-        _write_product(records.R_frame_from_body[k], small, R)
         if not knots:
+            _write_product(records.R_frame_from_body[k], small, R)
             continue
+        _write_product(records.R_frame_from_body[k], small, turned)
         at = (records.t_ns[k] - records.t_ns[0] + s * (records.t_ns[k + 1] - records.t_ns[k])) / NS_PER_S
         if at < drift.seconds[knot] or at >= drift.seconds[min(knot + 8, knots - 1)]:
             knot = max(int(np.searchsorted(drift.seconds, at, side="right")) - 1, 0)
@@ -111,5 +122,4 @@ def pose_intervals(
         for axis in range(3):
             position_m[i, axis] += error[axis]
         _write_rotation(error[3], error[4], error[5], small)
-        turned[:] = R
         _write_product(small, turned, R)

@@ -4,15 +4,40 @@ The unknowns are the records' noise divided by its standard deviations. So their
 standard deviation of zero is no special case. y = (x, knot before, knot after, v) are the columns that remain.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.maths.kernels.compiled import CUBE, CUBES, LINE, MATRIX, NUMBERS, compiled
+from pipeline.maths.kernels.compiled import CUBE, CUBES, LINE, MATRIX, NUMBERS, compiled, named
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 N_POSE, N_MOVED = 6, 3  # numbers of a pose error, and of the features on which it acts
 LINEAR = (NUMBERS, CUBE, MATRIX, MATRIX, CUBE, MATRIX)  # sides, design, pose, by_knot, normal, right
+
+
+class Scratch(NamedTuple):
+    """Scratch memory: of_features (F, m + 1); of_moved (2, 3, m + 1); of_pose (2, 6, m + 1); squares (3, 6, 6)."""
+
+    of_features: Array
+    of_moved: Array
+    of_pose: Array
+    squares: Array
+
+
+SCRATCH = named(Scratch, MATRIX, CUBE, CUBE, CUBE)
+
+
+def scratch(features: int, parameters: int) -> Scratch:
+    """Return the scratch memory for designs of so many rows and columns."""
+    width = parameters + 1
+    return Scratch(
+        of_features=np.empty((features, width)),
+        of_moved=np.empty((2, N_MOVED, width)),
+        of_pose=np.empty((2, N_POSE, width)),
+        squares=np.empty((3, N_POSE, N_POSE)),
+    )
 
 
 @compiled()
@@ -50,10 +75,10 @@ def _by_parameters(normal: Array, design: Array, right: Array, product: Array) -
                 product[f, column] += normal[f, h] * design[h, column]
 
 
-@compiled((CUBE, NUMBERS, *LINEAR, LINE))
+@compiled((CUBE, NUMBERS, *LINEAR, LINE, SCRATCH))
 def add_intervals(
     sums: Array, span: Integers, sides: Integers, design: Array, pose: Array, by_knot: Array,
-    normal: Array, right: Array, squares: Array,
+    normal: Array, right: Array, squares: Array, scratch: Scratch,
 ) -> None:  # fmt: skip
     """Add intervals of one sensor on one surface to the normal equations of their spans.
 
@@ -78,7 +103,7 @@ def add_intervals(
     features, m = design.shape[1:]
     v = sums.shape[1] - 1
     knots = v - 2 * N_POSE
-    seen, moved, square = np.empty((features, m + 1)), np.empty((N_POSE, m + 1)), np.empty((N_POSE, N_POSE))
+    seen, moved, square = scratch.of_features, scratch.of_pose[0], scratch.squares[0]
     for i in range(len(span)):
         to = sums[span[i]]
         _by_parameters(normal[i], design[i], right[i], seen)
@@ -104,10 +129,11 @@ def add_intervals(
                         to[first + row, knots + other * N_POSE + column] += share * square[row, column]
 
 
-@compiled((CUBES, CUBES, CUBES, NUMBERS, NUMBERS, *LINEAR, CUBE, MATRIX, CUBE))
+@compiled((CUBES, CUBES, CUBES, NUMBERS, NUMBERS, *LINEAR, CUBE, MATRIX, CUBE, SCRATCH))
 def add_records(
     own: Array, ahead: Array, border: Array, span: Integers, record: Integers, sides: Integers, design: Array,
     pose: Array, by_knot: Array, normal: Array, right: Array, swept: Array, right_swept: Array, swept_twice: Array,
+    scratch: Scratch,
 ) -> None:  # fmt: skip
     """Add intervals of one sensor on one surface to the blocks of the records before and after each.
 
@@ -127,9 +153,9 @@ def add_records(
     m = design.shape[2]
     v = border.shape[3] - 1
     knots = v - 2 * N_POSE
-    features, later = np.empty((N_MOVED, m + 1)), np.empty((N_MOVED, m + 1))
-    whole_x, later_x = np.empty((N_POSE, m + 1)), np.empty((N_POSE, m + 1))
-    whole, once, twice = np.empty((N_POSE, N_POSE)), np.empty((N_POSE, N_POSE)), np.empty((N_POSE, N_POSE))
+    features, later = scratch.of_moved[0], scratch.of_moved[1]
+    whole_x, later_x = scratch.of_pose[0], scratch.of_pose[1]
+    whole, once, twice = scratch.squares[0], scratch.squares[1], scratch.squares[2]
     for i in range(len(span)):
         j, k = span[i], record[i]
         _by_parameters(normal[i], design[i], right[i], features)
@@ -201,6 +227,16 @@ def _less_square(lines: Array, sums: Array) -> None:
             of_row[q] -= swept + e * lines[4, q] + f * lines[5, q]
 
 
+@compiled()
+def _is_zero(block: Array) -> bool:
+    """Return whether all elements of a matrix are zero."""
+    for row in range(block.shape[0]):
+        for column in range(block.shape[1]):
+            if block[row, column] != 0.0:
+                return False
+    return True
+
+
 @compiled((CUBES, CUBES, CUBES, LINE, CUBE, LINE))
 def eliminate_records(
     own: Array, ahead: Array, border: Array, white: Array, sums: Array, log_determinant: Array
@@ -226,7 +262,7 @@ def eliminate_records(
         linked = False
         for k in range(length):
             block, lines, following = own[j, k], border[j, k], ahead[j, k]
-            if not linked and np.all(block == 0.0):
+            if not linked and _is_zero(block):
                 continue
             for p in range(N_POSE):
                 for q in range(N_POSE):
@@ -241,6 +277,6 @@ def eliminate_records(
             log_determinant[j] += _factorised(block)
             _substituted(block, lines)
             _less_square(lines, sums[j])
-            linked = bool(np.any(following != 0.0))
+            linked = not _is_zero(following)
             if linked:
                 _substituted(block, following)

@@ -20,17 +20,18 @@ from pipeline.maths.kernels.interval_group import (
     NOISE,
     POINTS,
     RECORDS,
+    SCRATCH,
     SUMS,
     SURFACES,
     Noise,
     Points,
     Records,
+    Scratch,
     Sums,
     Surfaces,
     V,
     add_group,
     common_variance,
-    largest_group,
     mirror,
     turn_features,
     weigh,
@@ -137,14 +138,14 @@ def _observe(
     return float(variance)
 
 
-@compiled((POINTS, POSES, RECORDS, SURFACES, NOISE, SUMS))
+@compiled((POINTS, POSES, RECORDS, SURFACES, NOISE, SUMS, SCRATCH))
 def sum_soundings(
-    points: Points, poses: SonarPoses, records: Records, surfaces: Surfaces, noise: Noise, sums: Sums
-) -> None:
+    points: Points, poses: SonarPoses, records: Records, surfaces: Surfaces, noise: Noise, sums: Sums,
+    scratch: Scratch,
+) -> None:  # fmt: skip
     """Add the soundings to the sums of their slots, and to the statistics of their surfaces."""
     n = len(points.record)
-    kept, q = np.zeros((largest_group(points.record), FEATURES + 2 * (F - 1))), np.empty(F)
-    seen = np.empty((3, 3))
+    kept, seen = scratch.kept, scratch.vectors
     first = 0
     while first < n:
         k, end = points.record[first], first
@@ -160,6 +161,6 @@ def sum_soundings(
                 surfaces.axes[s], row[FEATURES], row[FEATURES + 1], points.share[p], noise.white
             )
             weigh(row, variance, s, noise, sums.statistics)
-        add_group(first, end, points, kept, q, sums)
+        add_group(first, end, points, scratch, sums)
         first = end
     mirror(sums)
