@@ -115,6 +115,8 @@ def accumulate(streams: Mapping[str, Stream], model: ObservationModel, values: C
 def reweighted(accumulation: Accumulation, state: State, weighting: Weighting) -> tuple[Accumulation, Weighting]:
     """Return the sums rescaled by new variance factors and edge shares, and the weighting with these.
 
+    The sums take the memory of those of ``accumulation``, which are lost.
+
     The scatter within the intervals changes the factor of each sensor and surface. Where it has few degrees of freedom,
     the sensor's other surfaces count as well.
 
@@ -135,5 +137,5 @@ def reweighted(accumulation: Accumulation, state: State, weighting: Weighting) -
         change, dof = np.array([(part.factor, part.dof) for part in parts]).T
         factors[sensor] = shrunk_factors(np.maximum(factor * change, LEAST_SCALE**2), dof, level)
         shares[sensor] = edge_shares(intervals, len(surfaces))
-        sums[sensor] = rescaled(intervals, factors[sensor] * shares[sensor] / (factor * share))
+        sums[sensor] = rescaled(intervals, factors[sensor] * shares[sensor] / (factor * share), in_place=True)
     return replace(accumulation, sums=sums), replace(weighting, factors=factors, edge_shares=shares)

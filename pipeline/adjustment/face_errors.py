@@ -33,6 +33,23 @@ class FinalSolution:
     solution: Solution
 
 
+def with_shared_noise(
+    problem: CalibrationProblem, adjustment: MountAdjustment, sums_by_face: Mapping[str, IntervalSums]
+) -> dict[str, IntervalSums]:
+    """Return the sums by interval and face with the noise that the soundings of a ping share.
+
+    They take the memory of those of ``sums_by_face``, which are lost. Parameters: as for :func:`final_solution`.
+    """
+    sums = dict(sums_by_face)
+    if adjustment.ping is not None:
+        face, surfaces = sums["mbes"].surface, adjustment.last.linearisation.state.surfaces
+        on_surface = replace(sums["mbes"], surface=problem.model.faces.surface[face])
+        white = problem.prior.noise.white
+        with_pings = with_ping_noise(on_surface, adjustment.ping, surfaces, white, in_place=True)
+        sums["mbes"] = replace(with_pings, surface=face)
+    return sums
+
+
 def final_solution(
     problem: CalibrationProblem,
     adjustment: MountAdjustment,
@@ -48,18 +65,12 @@ def final_solution(
     adjustment : MountAdjustment
         The adjusted values.
     sums_by_face : mapping of IntervalSums
-        Sums by interval and face at these values, by sensor.
+        Sums by interval and face at these values, by sensor, from :func:`with_shared_noise`.
     noise : PoseNoise, optional
         The pose errors; by default with the estimated figures of the drift.
     """
     faces, last, noise = problem.model.faces, adjustment.last, noise or adjustment.drift_figures.noise
-    sums = dict(sums_by_face)
-    if adjustment.ping is not None:
-        on_surface = replace(sums["mbes"], surface=faces.surface[sums["mbes"].surface])
-        surfaces = last.linearisation.state.surfaces
-        with_pings = with_ping_noise(on_surface, adjustment.ping, surfaces, problem.prior.noise.white)
-        sums["mbes"] = replace(with_pings, surface=sums["mbes"].surface)
-    linearisation = replace(last.linearisation, sums=sums)
+    linearisation = replace(last.linearisation, sums=sums_by_face)
     equations, prior = equations_with_faces(linearisation, faces, last.drift, noise), last.prior
     count, state, coarse = len(faces.names), adjustment.state, problem.model.coarse
     known = coarse if problem.prior.parameters is None else problem.prior.parameters.known

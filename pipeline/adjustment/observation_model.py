@@ -187,7 +187,7 @@ class ObservationModel:
             columns = {name: column[rows] for name, column in points.items()}
             on_surface = SurfaceBatch.of(columns, record[rows], share[rows], state.surfaces[number])
             on_plane = linearised(on_surface, state)
-            r, design, place = on_plane.r, on_plane.design, on_surface.record - errors.record[0]
+            r, design, place = on_plane.r, on_plane.design, np.searchsorted(errors.record, on_surface.record)
             shift = on_surface.intervals.spread(shifts[place, number].T)
             v[rows] = on_plane.v_m + np.einsum("fn,fn->n", shift, design.features)
             mean[rows], sigma[rows], features[:, rows], slopes[:, rows] = design
@@ -226,13 +226,12 @@ class ObservationModel:
         return {name: column[order] for name, column in batch.items()}, surface[order]
 
     def pose_errors(self, drift: DriftEstimate | None, record: Integers) -> RecordErrors:
-        """Return the drift in the middle of each interval from the batch's first to its last, zero if it is None."""
-        first, last = (int(record.min()), int(record.max()) + 1) if len(record) else (0, 0)
-        seconds = self.body.seconds[first : last + 1]
-        error = np.zeros((last - first, N_POSE))
+        """Return the drift in the middle of the intervals after these records, zero if it is None."""
+        first, seconds = np.unique(record), self.body.seconds
+        error = np.zeros((len(first), N_POSE))
         if drift is not None:
-            error = drift.at((seconds[:-1] + seconds[1:]) / 2)
-        return RecordErrors(np.arange(first, last), error)
+            error = drift.at((seconds[first] + seconds[first + 1]) / 2)
+        return RecordErrors(first, error)
 
     def _linearised_laser(self, batch: SurfaceBatch, state: State) -> LinearisedBatch:
         trajectory, record, axes = self.body.trajectory, batch.record, batch.axes

@@ -101,13 +101,12 @@ def summed(
     apart = points["face"].astype(np.int64) if residuals else surface
     slots = _Slots.of(points["t_ns"], apart, model.body.trajectory.t_ns, max(surfaces, len(model.faces.names)))
     errors = model.pose_errors(values.drift, slots.record)
-    first = int(errors.record[0]) if len(errors.record) else 0
     of_points = Points(
         place_m=_laser_places(points, model, state) if sensor == "laser" else _axes(points, "mbes_m"),
         edge=_line(points["edge_weight"]),
         surface=surface,
         height_m=_line(model.height_of_face[points["face"]]),
-        record=slots.record - first,
+        record=np.searchsorted(errors.record, slots.record),
         share=slots.share,
         slot=slots.slot,
     )
@@ -122,7 +121,7 @@ def summed(
     sums = _empty_sums(len(slots.record_of), surfaces, features, len(surface) if residuals else 0)
     memory = scratch(of_points.record, surfaces, features)
     if sensor == "laser":
-        poses = _laser_poses(points, model, state, slice(first, first + len(errors.record)))
+        poses = _laser_poses(points, model, state, errors.record)
         sum_laser_points(of_points, poses, of_records, of_surfaces, noise, sums, memory)
     else:
         sum_soundings(of_points, _sonar_poses(points, model, state), of_records, of_surfaces, noise, sums, memory)
@@ -144,12 +143,12 @@ def _laser_places(points: Batch, model: ObservationModel, state: State) -> Array
     return _axes(points, "target_m")
 
 
-def _laser_poses(points: Batch, model: ObservationModel, state: State, records: slice) -> LaserPoses:
+def _laser_poses(points: Batch, model: ObservationModel, state: State, record: Integers) -> LaserPoses:
     trajectory, own = model.body.trajectory, _axes(points, "laser_m")
     return LaserPoses(
         range_m=np.sqrt(own[0] ** 2 + own[1] ** 2 + own[2] ** 2),
-        position_m=_line(trajectory.positions_m[records.start : records.stop + 1]),
-        lever_arm_m=_line(trajectory.R_frame_from_body[records] @ model.body.lever_arm("laser", state)),
+        position_m=_line(trajectory.positions_m[record[:, None] + np.arange(2)]),
+        lever_arm_m=_line(trajectory.R_frame_from_body[record] @ model.body.lever_arm("laser", state)),
     )
 
 

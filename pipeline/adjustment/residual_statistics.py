@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from pipeline.adjustment.face_errors import with_shared_noise
 from pipeline.adjustment.iteration import MountAdjustment
 from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
 from pipeline.adjustment.point_sums import SummedBatch, summed
@@ -50,7 +51,7 @@ PassMeans = Mapping[tuple[str, int, int], BinMean]  # key: sensor, surface, pass
 class ResidualStatistics:
     """Mean residuals by sensor, surface and pass; table ``patterns``, means by all bins; table ``residuals``.
 
-    sums_by_face: by sensor, the sums of each interval and face at the adjusted values.
+    sums_by_face: by sensor, the sums of each interval and face at the adjusted values, for ``final_solution``.
     """
 
     pass_means: PassMeans
@@ -127,7 +128,7 @@ def residual_statistics(
         pass_means=pass_means,
         patterns=_patterns_table(patterns, settings.test_tolerance_m),
         residuals=residuals_table(samples),
-        sums_by_face=sums_by_face,
+        sums_by_face=with_shared_noise(problem, adjustment, sums_by_face),
     )
 
 

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import ModuleType
 
+from pipeline.artefacts.memory import give_back_memory
 from pipeline.config.session import Calibrated
 from pipeline.errors import ArtefactError
 from pipeline.run import folder, manifest
@@ -158,6 +159,7 @@ def _bring_up_to_date(this: Run, stage: ModuleType, first: bool = False) -> bool
         this.progress.reasons(name, reasons)
     with this.progress.stage(name):
         execute_stage(this, stage)
+    give_back_memory()
     for line in _losses(manifest.read_manifest(this.folder(name))):
         this.progress.note(f"{name}: {line}")
     return True

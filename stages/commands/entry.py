@@ -1,7 +1,5 @@
 """No command: this module turns exceptions into exit statuses, and handles interrupts and closed output streams."""
 
-import contextlib
-import ctypes
 import gc
 import os
 import signal
@@ -13,12 +11,12 @@ from typing import Any
 
 import typer
 
+from pipeline.artefacts.memory import use_one_heap
 from pipeline.errors import PoolcalError
 from pipeline.language.speaking import say
 from stages.commands.usage import usage_message
 
 INTERRUPTED = 130  # the exit status that typer returns after Ctrl-C
-ARENA_MAX = -8  # M_ARENA_MAX in malloc.h of glibc
 STOPPED = "poolcal: interrupted; what was complete is kept"
 SPEAKERS = ("typer", "click", "rich")  # packages that print the help
 interrupts: list[int] = []
@@ -83,12 +81,10 @@ def _interrupted(number: int, _: object) -> None:
 def prepare_process() -> None:
     """Prepare for output and memory: record Ctrl-C, replace closed streams, and escape letters that cannot be encoded.
 
-    The imports make a million objects that stay: to look for garbage at every 700 takes a tenth of a second. The
-    threads of a run share one heap: with a heap for each, glibc keeps more memory that is free, a seventh of all.
+    The imports make a million objects that stay: to look for garbage at every 700 takes a tenth of a second.
     """
     gc.set_threshold(50_000)
-    with contextlib.suppress(OSError, AttributeError):  # another library of C
-        ctypes.CDLL(None).mallopt(ARENA_MAX, 1)
+    use_one_heap()
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, _interrupted)
     for name in ("stdout", "stderr"):

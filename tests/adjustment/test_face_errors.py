@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.adjustment.face_errors import FinalSolution, final_solution
+from pipeline.adjustment.face_errors import FinalSolution, final_solution, with_shared_noise
 from pipeline.adjustment.iteration import adjust_mount
 from pipeline.adjustment.observation_model import ObservationModel
 from pipeline.artefacts.streams import Stream
@@ -23,7 +23,7 @@ def solved_with_faces(streams: dict[str, Stream], model: ObservationModel) -> Fi
         observations = model.linearise(sensor, part.columns, adjustment.values)
         _, weight = adjustment.weighting.weights(observations)
         sums[sensor] = observations.sums(weight, by_face=True)
-    found = final_solution(calibration, adjustment, sums)
+    found = final_solution(calibration, adjustment, with_shared_noise(calibration, adjustment, sums))
     if adjustment.ping is not None and adjustment.ping.excess == 0:  # else sums of faces are approximate
         u = adjustment.state.size
         scale = np.sqrt(np.maximum(np.diag(adjustment.equations.normal), 1e-300))

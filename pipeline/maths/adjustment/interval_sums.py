@@ -21,7 +21,7 @@ pose error acts. (With the mean of s instead, the mean normalised squared error 
 8.3.)
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 N_MOVED = 3  # number of the features on which a pose error acts: 1, α, β
+BLOCK = 4096  # number of intervals whose matrices are computed at a time: some MB
 
 
 @dataclass(frozen=True)
@@ -66,6 +67,21 @@ class IntervalSums:
     def selected(self, rows: Integers | slice) -> "IntervalSums":
         """Return the intervals in these rows."""
         return IntervalSums(**{name: getattr(self, name)[rows] for name in self.__dataclass_fields__})
+
+    def by_block(
+        self, change: Callable[["IntervalSums"], "IntervalSums"], in_place: bool = False
+    ) -> "IntervalSums":
+        """Return the intervals after a change of each alone; ``change`` gets some of them at a time.
+
+        ``in_place``: in the memory of these, which are lost.
+        """
+        empty = {} if in_place else {name: np.empty_like(values) for name, values in vars(self).items()}
+        changed = replace(self, **empty)
+        for start in range(0, len(self), BLOCK):
+            rows = slice(start, start + BLOCK)
+            for name, values in vars(change(self.selected(rows))).items():
+                getattr(changed, name)[rows] = values
+        return changed
 
     def shifted(self, change: Array) -> "IntervalSums":
         """Return the sums of the same observations after v has changed by q · ``change`` (g, F).
@@ -167,15 +183,6 @@ def interval_sums(points: LinearisedPoints) -> IntervalSums:
         squared_count=total(count**2),
     )
     return merged([sums.selected(np.flatnonzero(normal[:, 0, 0] > 0))])
-
-
-def joined(pieces: Iterable[IntervalSums]) -> IntervalSums:
-    """Return intervals one piece after the other; there is one piece at least.
-
-    Pieces to which nothing else refers give their memory back one field after the other.
-    """
-    parts = [dict(vars(piece)) for piece in pieces]
-    return IntervalSums(**{name: np.concatenate([part.pop(name) for part in parts]) for name in list(parts[0])})
 
 
 def let_go(pieces: list[IntervalSums]) -> Iterator[IntervalSums]:

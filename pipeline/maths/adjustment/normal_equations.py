@@ -37,7 +37,7 @@ from pipeline.maths.adjustment.eliminate_white_noise import (
     TimeAxis,
     eliminate_white_noise,
 )
-from pipeline.maths.adjustment.interval_sums import IntervalSums
+from pipeline.maths.adjustment.interval_sums import BLOCK, IntervalSums
 from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.pose_errors import (
     DriftEstimate,
@@ -48,7 +48,6 @@ from pipeline.maths.mount_parameters import N_MOUNT
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-BLOCK = 50_000  # number of intervals whose designs are computed at a time
 
 
 @dataclass(frozen=True)
@@ -208,7 +207,7 @@ def mount_step(linearisation: Linearisation) -> Array:
 
 @dataclass(frozen=True)
 class RecordErrors:
-    """Consecutive INS records (r,), and the pose error (r, 6), m and rad, in the middle of the interval after each."""
+    """INS records (r,), ascending, and the pose error (r, 6), m and rad, in the middle of the interval after each."""
 
     record: Integers
     error: Array

@@ -41,7 +41,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.maths.adjustment.design_matrix import pose_design
-from pipeline.maths.adjustment.interval_sums import N_MOVED, IntervalSums, joined
+from pipeline.maths.adjustment.interval_sums import N_MOVED, IntervalSums
 from pipeline.maths.adjustment.parameters import ObservedSurface
 from pipeline.maths.adjustment.weighting import FEWEST, FLAT, EpochVarianceFactor
 
@@ -52,7 +52,6 @@ ROUNDS = 3  # of each estimation in turn
 OVERLAP = 1.5  # variance of an estimate from overlapping differences over that from independent ones
 NEAR = 3.0  # an interval farther from its successor than this multiple of the usual distance is left out
 ALIKE = 0.9  # cosine of the directions of two lines whose slopes are compared
-BLOCK = 4096  # number of intervals that are changed at a time
 LEAST_SPREAD = 1e-300  # smallest divisor
 
 
@@ -104,7 +103,7 @@ def ping_noise(
 
 
 def with_ping_noise(
-    sums: IntervalSums, noise: PingNoise, surfaces: Sequence[ObservedSurface], white: Array
+    sums: IntervalSums, noise: PingNoise, surfaces: Sequence[ObservedSurface], white: Array, in_place: bool = False
 ) -> IntervalSums:
     """Return the sums of the sonar's intervals with the noise that the soundings of a ping share.
 
@@ -118,9 +117,10 @@ def with_ping_noise(
         The surfaces, in the order of their numbers in the sums.
     white : (6,) array
         Standard deviations of a record's white noise, m and rad.
+    in_place : bool
+        Whether they take the memory of ``sums``, which are lost.
     """
-    blocks = [slice(start, start + BLOCK) for start in range(0, max(1, len(sums)), BLOCK)]
-    return joined([_block_with_ping_noise(sums.selected(rows), noise, surfaces, white) for rows in blocks])
+    return sums.by_block(lambda block: _block_with_ping_noise(block, noise, surfaces, white), in_place)
 
 
 def _block_with_ping_noise(

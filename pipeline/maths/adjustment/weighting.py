@@ -82,7 +82,7 @@ def scatter(
         Edge shares κ by surface, by which the weights of the sums are divided; by default 1.
     """
     use = np.flatnonzero(rows & (sums.count >= FEWEST))
-    normal, right = sums.normal[use][:, :N_MOVED, :N_MOVED], sums.right[use][:, :N_MOVED]
+    normal, right = sums.normal[use, :N_MOVED, :N_MOVED], sums.right[use, :N_MOVED]
     scale = 1 / np.sqrt(np.maximum(np.einsum("gii->gi", normal), 1e-300))
     values, vectors = np.linalg.eigh(normal * scale[:, :, None] * scale[:, None, :])
     determined = values > FLAT
@@ -130,12 +130,15 @@ def _drawn(factors: Array, dof: Array, prior: float) -> float:
     return float((PRIOR_DOF * prior + dof @ factors) / (PRIOR_DOF + dof.sum()))
 
 
-def rescaled(sums: IntervalSums, divisors: Array) -> IntervalSums:
-    """Return the sums with the weights divided by a number for each surface, (s,)."""
+def rescaled(sums: IntervalSums, divisors: Array, in_place: bool = False) -> IntervalSums:
+    """Return the sums with the weights divided by a number for each surface, (s,); ``in_place``: in their memory."""
     share = 1 / divisors[sums.surface]
     names = ("normal", "swept", "swept_twice", "right", "right_swept", "squares")
-    parts = {name: getattr(sums, name) for name in names}
-    return replace(sums, **{name: part * share.reshape(-1, *[1] * (part.ndim - 1)) for name, part in parts.items()})
+    changed = {}
+    for name in names:
+        part = getattr(sums, name)
+        changed[name] = np.multiply(part, share.reshape(-1, *[1] * (part.ndim - 1)), out=part if in_place else None)
+    return replace(sums, **changed)
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+BLOCK = 16_384  # number of rotations that are computed at a time: some MB
 
 
 def rotation_x(angle_rad: float) -> Array:
@@ -94,6 +95,8 @@ def quaternion_from_rotation(R: Array) -> Array:
     Shepperd's method: the largest component comes from a square root, the others from products with it.
     """
     m = np.asarray(R, dtype=np.float64)
+    if m.ndim == 3 and len(m) > BLOCK:
+        return np.concatenate([quaternion_from_rotation(m[k : k + BLOCK]) for k in range(0, len(m), BLOCK)])
     trace = np.trace(m, axis1=-2, axis2=-1)
     diagonal = np.diagonal(m, axis1=-2, axis2=-1)
     squares = np.concatenate([(1 + trace)[..., None], 1 - trace[..., None] + 2 * diagonal], axis=-1)

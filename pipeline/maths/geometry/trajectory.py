@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from pipeline.maths.geometry.geodesy import PoolFrame, ecef_from_geodetic, rotation_ecef_from_level
 from pipeline.maths.geometry.rotations import (
+    BLOCK,
     log_so3,
     quaternion_from_rotation,
     rotation_from_attitude,
@@ -58,8 +59,11 @@ class Trajectory:
         R_frame_from_body
             Rotations (n, 3, 3).
         """
-        steps = log_so3(np.swapaxes(R_frame_from_body[:-1], -1, -2) @ R_frame_from_body[1:])
-        return cls(block(t_ns), positions_m, R_frame_from_body, np.concatenate([steps, np.zeros((1, 3))]))
+        steps = np.zeros((len(t_ns), 3))
+        for k in range(0, len(steps) - 1, BLOCK):
+            before, after = R_frame_from_body[:-1][k : k + BLOCK], R_frame_from_body[1:][k : k + BLOCK]
+            steps[:-1][k : k + BLOCK] = log_so3(np.swapaxes(before, -1, -2) @ after)
+        return cls(block(t_ns), positions_m, R_frame_from_body, steps)
 
     def transformed(self, R_new_from_frame: Array, shift_m: Array) -> "Trajectory":
         """Return the same poses in another frame: x_new = R_new_from_frame · x + shift.
@@ -121,10 +125,13 @@ class Trajectory:
         first = np.maximum(np.searchsorted(self.t_ns, self.t_ns - reach), holes[run] + 1)
         last = np.minimum(np.searchsorted(self.t_ns, self.t_ns + reach, side="right") - 1, holes[run + 1])
         seconds = np.maximum(self.t_ns[last] - self.t_ns[first], 1)[:, None] / NS_PER_S
-        turned = log_so3(np.swapaxes(self.R_frame_from_body[first], -1, -2) @ self.R_frame_from_body[last])
-        turning = np.einsum("nij,nj->ni", self.R_frame_from_body, turned)
-        way = self.positions_m[last] - self.positions_m[first]
-        return np.asarray(np.concatenate([way, turning], axis=1) / seconds)
+        rates = np.empty((len(self.t_ns), 6))
+        for k in range(0, len(rates), BLOCK):
+            rows, R = slice(k, k + BLOCK), self.R_frame_from_body
+            turned = log_so3(np.swapaxes(R[first[rows]], -1, -2) @ R[last[rows]])
+            rates[rows, :3] = self.positions_m[last[rows]] - self.positions_m[first[rows]]
+            rates[rows, 3:] = np.einsum("nij,nj->ni", R[rows], turned)
+        return np.asarray(rates / seconds)
 
     def points_from_body(self, t_ns: Times, points_body_m: Array) -> Array:
         """Return the coordinates (n, 3) m in this frame of points (n, 3) m in the body frame at times (n,)."""

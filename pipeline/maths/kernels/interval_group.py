@@ -24,7 +24,7 @@ OBSERVED = (V, MEAN, ROBUST, PLAIN, SIZE, COSINE)  # columns of ``kept`` that ar
 
 
 class Points(NamedTuple):
-    """Points, ascending in time. n: their number; a *record* is counted from the first of the batch.
+    """Points, ascending in time. n: their number; a *record* is counted among those of the batch that have points.
 
     place_m (3, n): the laser's in the target frame, the soundings in the sonar's own; edge (n,): weight near edges;
     surface (n,): number of the surface; height_m (n,): of the face over its surface; record, share, slot (n,): see

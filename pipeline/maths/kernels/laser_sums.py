@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.maths.adjustment.design_matrix import AT_45_DEG
-from pipeline.maths.kernels.compiled import LINE, MATRIX, compiled, named
+from pipeline.maths.kernels.compiled import CUBE, LINE, MATRIX, compiled, named
 from pipeline.maths.kernels.interval_group import (
     COMMON,
     COSINE,
@@ -43,14 +43,14 @@ SLOPES = FEATURES + F - 1
 
 
 class LaserPoses(NamedTuple):
-    """range_m (n,) of the points; position_m (r + 1, 3) of the body; lever_arm_m (r, 3): all in the target frame."""
+    """range_m (n,) of the points; position_m (r, 2, 3) of the body at each record and the next; lever_arm_m (r, 3)."""
 
     range_m: Array
     position_m: Array
     lever_arm_m: Array
 
 
-POSES = named(LaserPoses, LINE, MATRIX, MATRIX)
+POSES = named(LaserPoses, LINE, CUBE, MATRIX)
 
 
 @compiled((POINTS, POSES, RECORDS, SURFACES, NOISE, SUMS, SCRATCH))
@@ -76,8 +76,8 @@ def sum_laser_points(
             for i in range(3):
                 seen, arm = 0.0, 0.0
                 for j in range(3):
-                    step = poses.position_m[k + 1, j] - poses.position_m[k, j]
-                    seen += A[i, j] * (points.place_m[j, p] - (poses.position_m[k, j] + share * step))
+                    start, stop = poses.position_m[k, 0, j], poses.position_m[k, 1, j]
+                    seen += A[i, j] * (points.place_m[j, p] - (start + share * (stop - start)))
                     arm += A[i, j] * poses.lever_arm_m[k, j]
                 r[i] = seen
                 ray[i] = (seen - arm) / range_m
