@@ -15,6 +15,7 @@ from pipeline.adjustment.point_sums import SummedBatch, summed
 from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.adjustment.residual_tables import residual_sample, residuals_table, sampling_step
 from pipeline.artefacts.catalogue.results import PATTERNS
+from pipeline.artefacts.memory import give_back_memory
 from pipeline.artefacts.streams import Batch, Stream, point_array
 from pipeline.config.pool import Adjust
 from pipeline.gps_time import NS
@@ -98,6 +99,7 @@ def residual_statistics(
     settings : Adjust
         Length of a slot of time, and tolerance of the tests.
     """
+    give_back_memory()  # the readings before have left holes
     pass_means: dict[tuple[str, int, int], BinMean] = {}
     patterns: list[Row] = []
     samples: list[Batch] = []
@@ -115,6 +117,7 @@ def residual_statistics(
             by_face.append(face_sums)
             for variable, sums in sums_by_variable.items():
                 pieces.setdefault(variable, []).append(sums)
+        give_back_memory()
         sums_by_face[sensor] = merged(let_go(by_face))
         for variable, parts in pieces.items():
             sums = merged_residual_sums(parts)

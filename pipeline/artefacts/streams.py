@@ -14,7 +14,6 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from pipeline.artefacts.memory import give_back_memory
 from pipeline.errors import ArtefactError
 
 Batch = Mapping[str, np.ndarray]
@@ -172,7 +171,6 @@ class Stream:
         work = [(part, function, arguments) for part in self.parts]
         for results in self.mapper(_fold_part, work):
             yield from results
-        give_back_memory()
 
 
 EMPTY_STREAM = Stream(())

@@ -5,7 +5,6 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from pipeline.artefacts.memory import give_back_memory
 from pipeline.artefacts.schema import RawFiles
 from pipeline.artefacts.sinks import FolderSink
 from pipeline.atomic_files import remove
@@ -29,18 +28,15 @@ def execute_stage(this: Run, stage: ModuleType) -> None:
     partial = folder.partial(target)
     key = key_of(this, stage)
     config = stage_config(stage.Config, this.settings.resolved())
-
-    def begin() -> None:  # what was prepared needed more memory than what comes now
-        give_back_memory()
-        this.progress.begin(total)
-
     inputs = stage.Inputs(**{name: read_input(this, marker) for name, marker in inputs_in(this.stages, stage).items()})
     remove(partial)
     try:
         streams = make_folders(partial, stage)
         total = rows_to_map(this, stage)
         sink = FolderSink(partial, streams)
-        outputs = evaluate(stage, inputs, config, sink, mapper=this.workers.map, begin=begin)
+        outputs = evaluate(
+            stage, inputs, config, sink, mapper=this.workers.map, begin=lambda: this.progress.begin(total)
+        )
         rows = write_outputs(partial, stage, outputs)
         if _raw_has_changed(this, stage):
             raise RawDataError(f"{this.settings.session_folder}: files changed while they were read; run again")
