@@ -105,3 +105,13 @@ def test_a_boat_north_of_the_origin_heading_along_the_wall():
     )
     np.testing.assert_allclose(position[0], [0, 10, 1], atol=2e-3)
     np.testing.assert_allclose(R[0], np.eye(3), atol=2e-6)
+
+
+def test_more_records_than_are_computed_at_a_time(wild, monkeypatch):
+    t_ns, positions, R = wild
+    whole = Trajectory.build(t_ns, positions, R.as_matrix())
+    rates = whole.rates(0.05)
+    monkeypatch.setattr("pipeline.maths.geometry.trajectory.BLOCK", 7)
+    again = Trajectory.build(t_ns, positions, R.as_matrix())
+    np.testing.assert_array_equal(again.steps_rad, whole.steps_rad)
+    np.testing.assert_array_equal(again.rates(0.05), rates)

@@ -73,3 +73,10 @@ def test_quaternions_go_both_ways_whatever_component_is_largest():
     q = r.quaternion_from_rotation(R)
     np.testing.assert_allclose(np.abs(q), np.abs(Rotation.from_matrix(R).as_quat(scalar_first=True)), atol=1e-14)
     np.testing.assert_allclose(r.rotation_from_quaternion(q), R, atol=1e-14)
+
+
+def test_more_quaternions_than_are_computed_at_a_time(monkeypatch):
+    R = Rotation.random(23, random_state=4).as_matrix()
+    expected = r.quaternion_from_rotation(R)
+    monkeypatch.setattr(r, "BLOCK", 5)
+    np.testing.assert_array_equal(r.quaternion_from_rotation(R), expected)
