@@ -175,7 +175,7 @@ class ObservationModel:
         v, mean, sigma, common = np.empty((4, n))  # common: a variance
         features, slopes = np.empty((n_features, n)), np.empty((n_features - 1, n))
         by_pose = pose_design(state.surfaces, np.arange(len(state.surfaces)))
-        errors = self.pose_errors(values.drift, record)
+        errors = self.pose_errors(values.drift, np.unique(record))
         turns = errors.error[:, 3:].T
         shifts = residual_shift(state, sensor, self.body, errors, n_features)  # (r, s, F)
         linearised = self._linearised_laser if sensor == "laser" else self._linearised_sonar
@@ -226,12 +226,11 @@ class ObservationModel:
         return {name: column[order] for name, column in batch.items()}, surface[order]
 
     def pose_errors(self, drift: DriftEstimate | None, record: Integers) -> RecordErrors:
-        """Return the drift in the middle of the intervals after these records, zero if it is None."""
-        first, seconds = np.unique(record), self.body.seconds
-        error = np.zeros((len(first), N_POSE))
+        """Return the drift in the middle of the intervals after records (r,), ascending; zero if it is None."""
+        seconds, error = self.body.seconds, np.zeros((len(record), N_POSE))
         if drift is not None:
-            error = drift.at((seconds[first] + seconds[first + 1]) / 2)
-        return RecordErrors(first, error)
+            error = drift.at((seconds[record] + seconds[record + 1]) / 2)
+        return RecordErrors(record, error)
 
     def _linearised_laser(self, batch: SurfaceBatch, state: State) -> LinearisedBatch:
         trajectory, record, axes = self.body.trajectory, batch.record, batch.axes

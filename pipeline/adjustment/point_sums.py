@@ -25,7 +25,7 @@ from pipeline.maths.kernels.interval_group import (
     Records,
     Sums,
     Surfaces,
-    scratch,
+    group_scratch,
 )
 from pipeline.maths.kernels.interval_slots import slots_of
 from pipeline.maths.kernels.laser_sums import LaserPoses, sum_laser_points
@@ -100,13 +100,14 @@ def summed(
     surfaces = len(state.surfaces)
     apart = points["face"].astype(np.int64) if residuals else surface
     slots = _Slots.of(points["t_ns"], apart, model.body.trajectory.t_ns, max(surfaces, len(model.faces.names)))
-    errors = model.pose_errors(values.drift, slots.record)
+    of_record = Runs.of(slots.record)
+    errors = model.pose_errors(values.drift, slots.record[of_record.starts])
     of_points = Points(
         place_m=_laser_places(points, model, state) if sensor == "laser" else _axes(points, "mbes_m"),
         edge=_line(points["edge_weight"]),
         surface=surface,
         height_m=_line(model.height_of_face[points["face"]]),
-        record=np.searchsorted(errors.record, slots.record),
+        record=np.repeat(np.arange(len(errors.record)), of_record.lengths),
         share=slots.share,
         slot=slots.slot,
     )
@@ -119,7 +120,7 @@ def summed(
     )
     noise = _noise(model, sensor, values.weighting, surfaces)
     sums = _empty_sums(len(slots.record_of), surfaces, features, len(surface) if residuals else 0)
-    memory = scratch(of_points.record, surfaces, features)
+    memory = group_scratch(int(of_record.lengths.max(initial=1)), surfaces, features)
     if sensor == "laser":
         poses = _laser_poses(points, model, state, errors.record)
         sum_laser_points(of_points, poses, of_records, of_surfaces, noise, sums, memory)

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from pipeline.maths.adjustment.interval_sums import IntervalSums
 from pipeline.maths.adjustment.pose_errors import N_POSE, Knots
-from pipeline.maths.kernels.record_chain import add_intervals, add_records, eliminate_records, scratch
+from pipeline.maths.kernels.record_chain import add_intervals, add_records, chain_scratch, eliminate_records
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -219,7 +219,7 @@ class _RecordChain:
         design, pose = np.ascontiguousarray(intervals.design), np.ascontiguousarray(intervals.pose)
         by_knot = _knot_shares(sums, span, times)
         linear = (sides, design, pose, by_knot, sums.normal, sums.right)
-        memory = scratch(*design.shape[1:])
+        memory = chain_scratch(*design.shape[1:])
         add_intervals(self.normal, j, *linear, sums.squares, memory)
         if self.own.shape[1]:
             record, swept = sums.record - times.knots.record[span], (sums.swept, sums.right_swept, sums.swept_twice)

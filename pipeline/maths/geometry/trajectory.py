@@ -15,7 +15,7 @@ from pipeline.maths.geometry.rotations import (
 )
 from pipeline.maths.kernels.compiled import block
 from pipeline.maths.kernels.placing import Sensor, place_points
-from pipeline.maths.kernels.poses import Drift, Records, Scratch, pose_intervals
+from pipeline.maths.kernels.poses import Drift, PoseScratch, Records, pose_intervals
 
 Array = NDArray[np.float64]
 Times = NDArray[np.int64]
@@ -105,7 +105,7 @@ class Trajectory:
     def poses_with_drift(self, record: NDArray[np.int64], share: Array, drift: Drift) -> tuple[Array, Array]:
         """Return positions p + δ and rotations Exp(ω) R, for a drift (δ, ω) at seconds since the first record."""
         positions, R = np.empty((len(record), 3)), np.empty((len(record), 3, 3))
-        scratch = Scratch(np.empty(6), np.empty((3, 3)), np.empty((3, 3)))
+        scratch = PoseScratch(np.empty(6), np.empty((3, 3)), np.empty((3, 3)))
         pose_intervals(block(record), block(share), self._records, drift, positions, R, scratch)
         return positions, R
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.maths.kernels.compiled import CUBE, FLOAT, LINE, MATRIX, NUMBERS, block, compiled, named
+from pipeline.maths.kernels.compiled import CUBE, FLOAT, LINE, MATRIX, NUMBERS, compiled, named
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -91,7 +91,7 @@ class Sums(NamedTuple):
     observed: Array
 
 
-class Scratch(NamedTuple):
+class GroupScratch(NamedTuple):
     """Scratch memory: kept (m, k), a row for each point of a group; means (s, 2): Σ w, Σ w v of its points by surface.
 
     q (F,): features of a point; vectors (3, 3): of the sensor's loop.
@@ -108,25 +108,13 @@ RECORDS = named(Records, MATRIX, CUBE)
 SURFACES = named(Surfaces, CUBE, LINE)
 NOISE = named(Noise, LINE, LINE, LINE, FLOAT, FLOAT, LINE, FLOAT, FLOAT, FLOAT)
 SUMS = named(Sums, MATRIX, CUBE, CUBE, CUBE, MATRIX, MATRIX, MATRIX, MATRIX)
-SCRATCH = named(Scratch, MATRIX, MATRIX, LINE, MATRIX)
+SCRATCH = named(GroupScratch, MATRIX, MATRIX, LINE, MATRIX)
 
 
-def scratch(record: Integers, surfaces: int, features: int) -> Scratch:
-    """Return the scratch memory for points with these records."""
-    columns = FEATURES + 2 * (features - 1)
-    kept = np.zeros((largest_group(block(record)), columns))
-    return Scratch(kept, np.empty((surfaces, 2)), np.empty(features), np.empty((3, 3)))
-
-
-@compiled((NUMBERS,))
-def largest_group(record: Integers) -> int:
-    """Return the number of points of the largest group; at least 1."""
-    largest, start = 1, 0
-    for p in range(1, len(record) + 1):
-        if p == len(record) or record[p] != record[start]:
-            largest = max(largest, p - start)
-            start = p
-    return largest
+def group_scratch(largest: int, surfaces: int, features: int) -> GroupScratch:
+    """Return the scratch memory for groups of so many points at most."""
+    kept = np.zeros((largest, FEATURES + 2 * (features - 1)))
+    return GroupScratch(kept, np.empty((surfaces, 2)), np.empty(features), np.empty((3, 3)))
 
 
 @compiled()
@@ -219,7 +207,7 @@ def _add_point(q: Array, v: float, s: float, w: float, g: int, sums: Sums) -> No
 
 
 @compiled()
-def add_group(first: int, end: int, points: Points, scratch: Scratch, sums: Sums) -> None:
+def add_group(first: int, end: int, points: Points, scratch: GroupScratch, sums: Sums) -> None:
     """Add the points first to end to the sums of their slots, with the features at the adjusted points."""
     kept, means, q = scratch.kept, scratch.means, scratch.q
     features = len(q)

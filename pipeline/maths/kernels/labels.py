@@ -53,7 +53,7 @@ class Labels(NamedTuple):
     reason: NDArray[np.int8]
 
 
-class Scratch(NamedTuple):
+class LabelScratch(NamedTuple):
     """Scratch memory: met (3,), foot (3,), spread (3, 3)."""
 
     met: Array
@@ -64,7 +64,7 @@ class Scratch(NamedTuple):
 BEAMS = named(Beams, MATRIX, LINE, CUBE, LINE, FLOAT)
 LIMITS = named(Limits, *[FLOAT] * 8)
 LABELS = named(Labels, Block("int16", 1), LINE, LINE, Block("int8", 1))
-SCRATCH = named(Scratch, LINE, LINE, MATRIX)
+SCRATCH = named(LabelScratch, LINE, LINE, MATRIX)
 
 
 @compiled()
@@ -119,8 +119,9 @@ def _meet(
 
 @compiled((MATRIX, FLAGS, BEAMS, FACES, LIMITS, LABELS, SCRATCH))
 def label(
-    points_m: Array, among: Flags, beams: Beams, faces: FaceTables, limits: Limits, labels: Labels, scratch: Scratch
-) -> None:
+    points_m: Array, among: Flags, beams: Beams, faces: FaceTables, limits: Limits, labels: Labels,
+    scratch: LabelScratch,
+) -> None:  # fmt: skip
     """Write the labels of points (3, n) in the target frame; ``among`` (n,): whether a point may have a label."""
     met, foot, spread = scratch
     d = beams.direction

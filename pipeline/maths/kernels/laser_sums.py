@@ -23,10 +23,10 @@ from pipeline.maths.kernels.interval_group import (
     SCRATCH,
     SUMS,
     SURFACES,
+    GroupScratch,
     Noise,
     Points,
     Records,
-    Scratch,
     Sums,
     Surfaces,
     V,
@@ -56,7 +56,7 @@ POSES = named(LaserPoses, LINE, CUBE, MATRIX)
 @compiled((POINTS, POSES, RECORDS, SURFACES, NOISE, SUMS, SCRATCH))
 def sum_laser_points(
     points: Points, poses: LaserPoses, records: Records, surfaces: Surfaces, noise: Noise, sums: Sums,
-    scratch: Scratch,
+    scratch: GroupScratch,
 ) -> None:  # fmt: skip
     """Add the points to the sums of their slots, and to the statistics of their surfaces.
 

@@ -32,7 +32,7 @@ class Drift(NamedTuple):
     values: Array
 
 
-class Scratch(NamedTuple):
+class PoseScratch(NamedTuple):
     """Scratch memory: error (6,), small (3, 3), turned (3, 3)."""
 
     error: Array
@@ -40,7 +40,7 @@ class Scratch(NamedTuple):
     turned: Array
 
 
-SCRATCH = named(Scratch, LINE, MATRIX, MATRIX)
+SCRATCH = named(PoseScratch, LINE, MATRIX, MATRIX)
 RECORDS, DRIFT = named(Records, NUMBERS, MATRIX, CUBE, MATRIX), named(Drift, LINE, MATRIX)
 
 
@@ -78,7 +78,7 @@ def _write_product(A: Array, B: Array, product: Array) -> None:
 @compiled((NUMBERS, LINE, RECORDS, DRIFT, MATRIX, CUBE, SCRATCH))
 def pose_intervals(
     record: Integers, share: Array, records: Records, drift: Drift, position_m: Array, R_frame_from_body: Array,
-    scratch: Scratch,
+    scratch: PoseScratch,
 ) -> None:  # fmt: skip
     """Write the poses of the body at shares of the intervals from record to record, corrected by the drift.
 

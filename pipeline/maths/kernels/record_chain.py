@@ -17,7 +17,7 @@ N_POSE, N_MOVED = 6, 3  # numbers of a pose error, and of the features on which 
 LINEAR = (NUMBERS, CUBE, MATRIX, MATRIX, CUBE, MATRIX)  # sides, design, pose, by_knot, normal, right
 
 
-class Scratch(NamedTuple):
+class ChainScratch(NamedTuple):
     """Scratch memory: of_features (F, m + 1); of_moved (2, 3, m + 1); of_pose (2, 6, m + 1); squares (3, 6, 6)."""
 
     of_features: Array
@@ -26,13 +26,13 @@ class Scratch(NamedTuple):
     squares: Array
 
 
-SCRATCH = named(Scratch, MATRIX, CUBE, CUBE, CUBE)
+SCRATCH = named(ChainScratch, MATRIX, CUBE, CUBE, CUBE)
 
 
-def scratch(features: int, parameters: int) -> Scratch:
+def chain_scratch(features: int, parameters: int) -> ChainScratch:
     """Return the scratch memory for designs of so many rows and columns."""
     width = parameters + 1
-    return Scratch(
+    return ChainScratch(
         of_features=np.empty((features, width)),
         of_moved=np.empty((2, N_MOVED, width)),
         of_pose=np.empty((2, N_POSE, width)),
@@ -78,7 +78,7 @@ def _by_parameters(normal: Array, design: Array, right: Array, product: Array) -
 @compiled((CUBE, NUMBERS, *LINEAR, LINE, SCRATCH))
 def add_intervals(
     sums: Array, span: Integers, sides: Integers, design: Array, pose: Array, by_knot: Array,
-    normal: Array, right: Array, squares: Array, scratch: Scratch,
+    normal: Array, right: Array, squares: Array, scratch: ChainScratch,
 ) -> None:  # fmt: skip
     """Add intervals of one sensor on one surface to the normal equations of their spans.
 
@@ -133,7 +133,7 @@ def add_intervals(
 def add_records(
     own: Array, ahead: Array, border: Array, span: Integers, record: Integers, sides: Integers, design: Array,
     pose: Array, by_knot: Array, normal: Array, right: Array, swept: Array, right_swept: Array, swept_twice: Array,
-    scratch: Scratch,
+    scratch: ChainScratch,
 ) -> None:  # fmt: skip
     """Add intervals of one sensor on one surface to the blocks of the records before and after each.
 

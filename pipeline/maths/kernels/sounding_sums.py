@@ -23,10 +23,10 @@ from pipeline.maths.kernels.interval_group import (
     SCRATCH,
     SUMS,
     SURFACES,
+    GroupScratch,
     Noise,
     Points,
     Records,
-    Scratch,
     Sums,
     Surfaces,
     V,
@@ -141,7 +141,7 @@ def _observe(
 @compiled((POINTS, POSES, RECORDS, SURFACES, NOISE, SUMS, SCRATCH))
 def sum_soundings(
     points: Points, poses: SonarPoses, records: Records, surfaces: Surfaces, noise: Noise, sums: Sums,
-    scratch: Scratch,
+    scratch: GroupScratch,
 ) -> None:  # fmt: skip
     """Add the soundings to the sums of their slots, and to the statistics of their surfaces."""
     n = len(points.record)

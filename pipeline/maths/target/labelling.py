@@ -180,7 +180,7 @@ def label_points(
     n = len(points_m)
     labels = kernel.Labels(np.empty(n, np.int16), np.empty(n), np.empty(n), np.empty(n, np.int8))
     every = np.ones(n, dtype=bool) if among is None else np.require(among, bool, ("C", "W"))
-    scratch = kernel.Scratch(np.empty(3), np.empty(3), np.empty((3, 3)))
+    scratch = kernel.LabelScratch(np.empty(3), np.empty(3), np.empty((3, 3)))
     kernel.label(block(points_m.T), every, _beam_arrays(beams), model.tables(settings.seen), limits, labels, scratch)
     return Labels(
         face=labels.face,
