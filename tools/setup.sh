@@ -87,9 +87,11 @@ echo "setup: installing packages into .venv (some minutes the first time)"
 pip() { .venv/bin/python -m pip --disable-pip-version-check "$@" </dev/null; }
 pip install -q -c constraints.txt setuptools && pip install -q -c constraints.txt --no-build-isolation -e ".${EXTRAS:+[$EXTRAS]}" ||
     fail "packages could not be installed (see above); correct this and run make setup again"
-.venv/bin/python -c '
-import open3d, pyarrow, rerun, stages.adjust, stages.cli
+loops='import sys, stages.adjust, stages.cli
 from pipeline.maths.kernels.compiled import compile_all
-compile_all()' || fail "the packages do not load, or the loops of pipeline/maths/kernels do not compile (see above)"
+compile_all(int(sys.argv[1]), 2)'
+.venv/bin/python -c "$loops" 0 & half=$! # the other processor compiles the other half
+{ .venv/bin/python -c "import open3d, pyarrow, rerun; $loops" 1 && wait "$half"; } ||
+    fail "the packages do not load, or the loops of pipeline/maths/kernels do not compile (see above)"
 echo "$wanted" >"$stamp"
 echo "setup: ready; the command is .venv/bin/poolcal"
