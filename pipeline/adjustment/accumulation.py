@@ -1,15 +1,17 @@
 """One reading of all labelled points: sums by interval at the current values, and new variance factors."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
+from pipeline.adjustment.observation_model import N_FEATURES, CurrentValues, ObservationModel
 from pipeline.adjustment.point_sums import COLUMNS, summed
+from pipeline.adjustment.stored_sums import StoredSums
 from pipeline.artefacts.streams import Batch, Stream
-from pipeline.maths.adjustment.interval_sums import IntervalSums, let_go, merged
+from pipeline.maths.adjustment.interval_sums import Intervals, IntervalSums
 from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.robust_weights import LEAST_SCALE, robust_scale
 from pipeline.maths.adjustment.weighting import Weighting, edge_shares, rescaled, scatter, shrunk_factors
@@ -46,7 +48,7 @@ class GroupStatistics:
 class Accumulation:
     """Result of one reading of all points: interval sums by sensor, and statistics by group of observations."""
 
-    sums: Mapping[str, IntervalSums]
+    sums: Mapping[str, Intervals]
     groups: Mapping[Group, GroupStatistics]
 
     @property
@@ -101,21 +103,20 @@ def accumulate(streams: Mapping[str, Stream], model: ObservationModel, values: C
     values : CurrentValues
         Parameters, drift and weights at which to linearise.
     """
-    sums, groups = {}, dict[Group, GroupStatistics]()
-    for sensor, stream in streams.items():
-        pieces = []
+    groups: dict[Group, GroupStatistics] = {}
+
+    def pieces(sensor: str, stream: Stream) -> Iterator[IntervalSums]:
         for piece, statistics in stream.only(COLUMNS[sensor]).fold(_accumulate_batch, model, sensor, values):
-            pieces.append(piece)
             for key, group in statistics.items():
                 groups[key] = groups[key] + group if key in groups else group
-        sums[sensor] = merged(let_go(pieces))
+            yield piece
+
+    sums = {name: StoredSums.of(pieces(name, stream), N_FEATURES[name]) for name, stream in streams.items()}
     return Accumulation(sums, groups)
 
 
 def reweighted(accumulation: Accumulation, state: State, weighting: Weighting) -> tuple[Accumulation, Weighting]:
     """Return the sums rescaled by new variance factors and edge shares, and the weighting with these.
-
-    The sums take the memory of those of ``accumulation``, which are lost.
 
     The scatter within the intervals changes the factor of each sensor and surface. Where it has few degrees of freedom,
     the sensor's other surfaces count as well.
@@ -129,7 +130,8 @@ def reweighted(accumulation: Accumulation, state: State, weighting: Weighting) -
     weighting : Weighting
         Weights with which the sums were made.
     """
-    factors, shares, sums = dict(weighting.factors), dict(weighting.edge_shares), {}
+    factors, shares = dict(weighting.factors), dict(weighting.edge_shares)
+    sums: dict[str, Intervals] = {}
     surfaces, level = np.arange(len(state.surfaces)), np.array([surface.level for surface in state.surfaces])
     for sensor, intervals in accumulation.sums.items():
         factor, share = weighting.factors_of(sensor, surfaces), weighting.edge_shares_of(sensor, surfaces)
@@ -137,5 +139,10 @@ def reweighted(accumulation: Accumulation, state: State, weighting: Weighting) -
         change, dof = np.array([(part.factor, part.dof) for part in parts]).T
         factors[sensor] = shrunk_factors(np.maximum(factor * change, LEAST_SCALE**2), dof, level)
         shares[sensor] = edge_shares(intervals, len(surfaces))
-        sums[sensor] = rescaled(intervals, factors[sensor] * shares[sensor] / (factor * share), in_place=True)
+        divisors = factors[sensor] * shares[sensor] / (factor * share)
+        sums[sensor] = intervals.changed(partial(_rescaled, divisors=divisors))
     return replace(accumulation, sums=sums), replace(weighting, factors=factors, edge_shares=shares)
+
+
+def _rescaled(sums: IntervalSums, _: Integers, divisors: Array) -> IntervalSums:
+    return rescaled(sums, divisors)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,12 +11,13 @@ from pipeline.adjustment.iteration import MountAdjustment
 from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.maths.adjustment.eliminate_drift import NormalEquations
 from pipeline.maths.adjustment.face_shifts import equations_with_faces
-from pipeline.maths.adjustment.interval_sums import IntervalSums
+from pipeline.maths.adjustment.interval_sums import Intervals, IntervalSums
 from pipeline.maths.adjustment.ping_noise import with_ping_noise
 from pipeline.maths.adjustment.pose_errors import PoseNoise
 from pipeline.maths.adjustment.solution import Solution, solve
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -34,26 +36,33 @@ class FinalSolution:
 
 
 def with_shared_noise(
-    problem: CalibrationProblem, adjustment: MountAdjustment, sums_by_face: Mapping[str, IntervalSums]
-) -> dict[str, IntervalSums]:
+    problem: CalibrationProblem, adjustment: MountAdjustment, sums_by_face: Mapping[str, Intervals]
+) -> dict[str, Intervals]:
     """Return the sums by interval and face with the noise that the soundings of a ping share.
 
-    They take the memory of those of ``sums_by_face``, which are lost. Parameters: as for :func:`final_solution`.
+    Parameters: as for :func:`final_solution`.
     """
     sums = dict(sums_by_face)
     if adjustment.ping is not None:
-        face, surfaces = sums["mbes"].surface, adjustment.last.linearisation.state.surfaces
-        on_surface = replace(sums["mbes"], surface=problem.model.faces.surface[face])
-        white = problem.prior.noise.white
-        with_pings = with_ping_noise(on_surface, adjustment.ping, surfaces, white, in_place=True)
-        sums["mbes"] = replace(with_pings, surface=face)
+        with_pings = partial(
+            with_ping_noise,
+            noise=adjustment.ping,
+            surfaces=adjustment.last.linearisation.state.surfaces,
+            white=problem.prior.noise.white,
+        )
+        of_face = problem.model.faces.surface
+
+        def changed(block: IntervalSums, _: Integers) -> IntervalSums:
+            return replace(with_pings(replace(block, surface=of_face[block.surface])), surface=block.surface)
+
+        sums["mbes"] = sums["mbes"].changed(changed)
     return sums
 
 
 def final_solution(
     problem: CalibrationProblem,
     adjustment: MountAdjustment,
-    sums_by_face: Mapping[str, IntervalSums],
+    sums_by_face: Mapping[str, Intervals],
     noise: PoseNoise | None = None,
 ) -> FinalSolution:
     """Return the solution with the shifts of single faces.
@@ -64,7 +73,7 @@ def final_solution(
         Model, prior information and consider errors of the calibration.
     adjustment : MountAdjustment
         The adjusted values.
-    sums_by_face : mapping of IntervalSums
+    sums_by_face : mapping of Intervals
         Sums by interval and face at these values, by sensor, from :func:`with_shared_noise`.
     noise : PoseNoise, optional
         The pose errors; by default with the estimated figures of the drift.

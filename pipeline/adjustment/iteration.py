@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -164,7 +165,9 @@ def adjust_mount(
         if "mbes" in streams:  # a part of the sonar's noise is common to a ping
             soundings, surfaces = last.linearisation.sums["mbes"], last.linearisation.state.surfaces
             ping = ping_noise(soundings, surfaces, prior.noise.white, factors["laser"])
-            with_pings = with_ping_noise(soundings, ping, surfaces, prior.noise.white)
+            with_pings = soundings.stored(
+                partial(with_ping_noise, noise=ping, surfaces=surfaces, white=prior.noise.white)
+            )
             last = replace(last, linearisation=last.linearisation.with_sums("mbes", with_pings))
             factors["mbes"] = ping.epoch
         noise = noise_seen_by_laser(prior.noise, factors["laser"])

@@ -18,7 +18,7 @@ import numpy as np
 from pipeline.adjustment.face_errors import FinalSolution, final_solution
 from pipeline.adjustment.iteration import MountAdjustment
 from pipeline.adjustment.problem import CalibrationProblem
-from pipeline.maths.adjustment.interval_sums import IntervalSums
+from pipeline.maths.adjustment.interval_sums import Intervals
 from pipeline.maths.adjustment.joint_tests import JointTest, joint_test
 from pipeline.maths.adjustment.parameter_tests import ParameterTest, prior_parameter_tests, single_parameter_tests
 from pipeline.maths.mount_parameters import N_MOUNT
@@ -64,7 +64,7 @@ def set_tests(final: FinalSolution, tests: Iterable[ParameterTest]) -> list[SetT
 def strengths_by_session(
     problem: CalibrationProblem,
     adjustment: MountAdjustment,
-    sums_by_face: Mapping[str, IntervalSums],
+    sums_by_face: Mapping[str, Intervals],
     final: FinalSolution,
 ) -> dict[str, float]:
     """Return the strengths of parameters and sets with the drift as the session says, if one explains more than drift.
@@ -77,7 +77,7 @@ def strengths_by_session(
         Model, prior information and consider errors of the calibration.
     adjustment : MountAdjustment
         The adjusted values.
-    sums_by_face : mapping of IntervalSums
+    sums_by_face : mapping of Intervals
         Sums by interval and face at these values, by sensor.
     final : FinalSolution
         The solution with the estimated figures of the drift.

@@ -10,17 +10,18 @@ from numpy.typing import NDArray
 
 from pipeline.adjustment.face_errors import with_shared_noise
 from pipeline.adjustment.iteration import MountAdjustment
-from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
+from pipeline.adjustment.observation_model import N_FEATURES, CurrentValues, ObservationModel
 from pipeline.adjustment.point_sums import SummedBatch, summed
 from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.adjustment.residual_tables import residual_sample, residuals_table, sampling_step
+from pipeline.adjustment.stored_sums import StoredSums
 from pipeline.artefacts.catalogue.results import PATTERNS
 from pipeline.artefacts.memory import give_back_memory
 from pipeline.artefacts.streams import Batch, Stream, point_array
 from pipeline.config.pool import Adjust
 from pipeline.gps_time import NS
 from pipeline.maths.adjustment.design_matrix import FLATTEST
-from pipeline.maths.adjustment.interval_sums import IntervalSums, let_go, merged
+from pipeline.maths.adjustment.interval_sums import Intervals, IntervalSums
 from pipeline.maths.adjustment.mean_tests import normal_deviates
 from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.pose_errors import drift_between_passes
@@ -58,7 +59,7 @@ class ResidualStatistics:
     pass_means: PassMeans
     patterns: pd.DataFrame
     residuals: pd.DataFrame
-    sums_by_face: Mapping[str, IntervalSums]
+    sums_by_face: Mapping[str, Intervals]
 
     def passes_of(self, sensor: str) -> list[int]:
         """Return the numbers of the passes in which a sensor has points."""
@@ -103,22 +104,16 @@ def residual_statistics(
     pass_means: dict[tuple[str, int, int], BinMean] = {}
     patterns: list[Row] = []
     samples: list[Batch] = []
-    sums_by_face: dict[str, IntervalSums] = {}
+    sums_by_face: dict[str, StoredSums] = {}
     families = [surface.family for surface in adjustment.state.surfaces]
     for sensor, stream in streams.items():
         step = sampling_step(adjustment.accumulation.observations(sensor))
         thinning = _Thinning(round(settings.moment_s * NS), step)
         pieces: dict[str, list[ResidualSums]] = {}
-        by_face = []
-        for sums_by_variable, face_sums, sample in stream.fold(
-            _batch, problem.model, sensor, adjustment.values, thinning
-        ):
-            samples.append(sample)
-            by_face.append(face_sums)
-            for variable, sums in sums_by_variable.items():
-                pieces.setdefault(variable, []).append(sums)
+        read = stream.fold(_batch, problem.model, sensor, adjustment.values, thinning)
+        by_face = _kept(read, pieces, samples)
+        sums_by_face[sensor] = StoredSums.of(by_face, N_FEATURES[sensor])
         give_back_memory()
-        sums_by_face[sensor] = merged(let_go(by_face))
         for variable, parts in pieces.items():
             sums = merged_residual_sums(parts)
             if variable == "pass":
@@ -133,6 +128,19 @@ def residual_statistics(
         residuals=residuals_table(samples),
         sums_by_face=with_shared_noise(problem, adjustment, sums_by_face),
     )
+
+
+def _kept(
+    read: Iterator[tuple[dict[str, ResidualSums], IntervalSums, Batch]],
+    pieces: dict[str, list[ResidualSums]],
+    samples: list[Batch],
+) -> Iterator[IntervalSums]:
+    """Yield the sums by interval and face of each batch; add its other sums and its sample to the lists."""
+    for by_variable, by_face, sample in read:
+        samples.append(sample)
+        for variable, sums in by_variable.items():
+            pieces.setdefault(variable, []).append(sums)
+        yield by_face
 
 
 def _batch(

@@ -5,6 +5,7 @@ stretch of a raw file, or (in series of simulated sessions, and in tests) a batc
 tuple of parts that can be read any number of times.
 """
 
+import contextlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -66,17 +67,26 @@ class Part(Protocol):
 
 
 @runtime_checkable
-class PartByColumns(Part, Protocol):
-    """A part that can be read without the columns that are not needed."""
+class DividedPart(Part, Protocol):
+    """A part of which some columns, or some rows, can be read alone."""
 
     def only(self, columns: tuple[str, ...]) -> Part:
         """Return the part with these columns alone."""
         ...
 
+    def pieces(self) -> Sequence[Part]:
+        """Return the part in pieces of consecutive rows."""
+        ...
+
 
 def only(part: Part, columns: tuple[str, ...]) -> Part:
     """Return a part with these columns alone, if it can be read so; else as it is."""
-    return part.only(columns) if isinstance(part, PartByColumns) else part
+    return part.only(columns) if isinstance(part, DividedPart) else part
+
+
+def pieces(part: Part) -> Sequence[Part]:
+    """Return a part in pieces, if it can be read so; else as it is."""
+    return part.pieces() if isinstance(part, DividedPart) else [part]
 
 
 @dataclass(frozen=True)
@@ -85,6 +95,7 @@ class ParquetPart:
 
     path: Path
     columns: tuple[str, ...] | None = None  # columns to read; None: all
+    group: int | None = None  # row group to read; None: all
 
     @property
     def name(self) -> str:
@@ -95,6 +106,11 @@ class ParquetPart:
         """Return the part with these columns alone."""
         return replace(self, columns=columns)
 
+    def pieces(self) -> list["ParquetPart"]:
+        """Return the row groups."""
+        with self._opened() as file:
+            return [replace(self, group=group) for group in range(file.num_row_groups)]
+
     def chunks(self) -> Iterator[Chunk]:
         """Yield the rows, at most BATCH_ROWS at a time."""
         for table in self._groups():
@@ -102,11 +118,16 @@ class ParquetPart:
                 yield Chunk(columns_of(table.slice(start, BATCH_ROWS)))
 
     def _groups(self) -> Iterator[pa.Table]:
+        columns = None if self.columns is None else list(self.columns)
+        with self._opened() as file:
+            for group in range(file.num_row_groups) if self.group is None else [self.group]:
+                yield file.read_row_group(group, columns=columns, use_threads=False)
+
+    @contextlib.contextmanager
+    def _opened(self) -> Iterator[pq.ParquetFile]:
         try:
-            columns = None if self.columns is None else list(self.columns)
             with pq.ParquetFile(self.path) as file:
-                for group in range(file.num_row_groups):
-                    yield file.read_row_group(group, columns=columns, use_threads=False)
+                yield file
         except (OSError, pa.ArrowException) as error:
             raise ArtefactError(f"{self.path}: cannot be read ({error}); delete its folder and run again") from error
 
@@ -159,7 +180,8 @@ class Stream:
     def fold(self, function: Callable[..., _T], *arguments: object) -> Iterator[_T]:
         """Yield ``function(batch, *arguments)`` for every batch, in order. The mapper may work on parts in parallel.
 
-        Take the results one by one: together they may not fit in memory.
+        Take the results one by one: together they may not fit in memory. (On this machine the parts are read in pieces,
+        so that few results wait. To a cluster the arguments are sent with every part, which costs more.)
 
         Parameters
         ----------
@@ -168,7 +190,8 @@ class Stream:
         *arguments
             Further arguments of the function.
         """
-        work = [(part, function, arguments) for part in self.parts]
+        parts = [piece for part in self.parts for piece in pieces(part)] if self.mapper == self.here else self.parts
+        work = [(part, function, arguments) for part in parts]
         for results in self.mapper(_fold_part, work):
             yield from results
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from pipeline.artefacts import parquet
 from pipeline.artefacts.schema import Artefact, Document, Provenance, RawFiles
-from pipeline.artefacts.streams import EMPTY_STREAM, Chunk, ParquetPart, Part, Stream, only
+from pipeline.artefacts.streams import EMPTY_STREAM, Chunk, ParquetPart, Part, Stream, only, pieces
 from pipeline.atomic_files import write_text, writing
 from pipeline.readers import dispatch
 from pipeline.run import manifest, provenance
@@ -72,6 +72,9 @@ class _Watched:
 
     def only(self, columns: tuple[str, ...]) -> "_Watched":
         return replace(self, part=only(self.part, columns))
+
+    def pieces(self) -> list["_Watched"]:
+        return [replace(self, part=piece) for piece in pieces(self.part)]
 
     def chunks(self) -> Iterator[Chunk]:
         for chunk in self.part.chunks():

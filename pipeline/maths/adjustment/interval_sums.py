@@ -23,6 +23,7 @@ pose error acts. (With the mean of s instead, the mean normalised squared error 
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,42 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 N_MOVED = 3  # number of the features on which a pose error acts: 1, α, β
 BLOCK = 4096  # number of intervals whose matrices are computed at a time: some MB
+
+
+class Intervals(Protocol):
+    """Intervals of one sensor as :class:`IntervalSums`, in memory or in a file. What needs their sums reads some."""
+
+    @property
+    def record(self) -> Integers:
+        """Return the last INS record (g,) before the points of each interval."""
+        ...
+
+    @property
+    def surface(self) -> Integers:
+        """Return the number (g,) of each interval's surface."""
+        ...
+
+    @property
+    def features(self) -> int:
+        """Return the number F of features."""
+        ...
+
+    def __len__(self) -> int: ...
+
+    def selected(self, rows: Integers | slice) -> "IntervalSums":
+        """Return the intervals in these rows."""
+        ...
+
+    def changed(self, change: Callable[["IntervalSums", Integers], "IntervalSums"]) -> "Intervals":
+        """Return the intervals after a quick change of each alone; ``change`` gets some of them, and their numbers.
+
+        Where they lie in a file, it is made whenever they are read.
+        """
+        ...
+
+    def stored(self, change: Callable[["IntervalSums"], "IntervalSums"]) -> "Intervals":
+        """Return the intervals after a change of each alone, which is made at once; ``change`` gets some of them."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -60,6 +97,11 @@ class IntervalSums:
         return len(self.record)
 
     @property
+    def features(self) -> int:
+        """Return the number F of features."""
+        return int(self.normal.shape[-1])
+
+    @property
     def share(self) -> Array:
         """Return the weighted mean of s in each interval (g,)."""
         return np.asarray(self.swept[:, 0, 0] / self.normal[:, 0, 0])
@@ -68,20 +110,13 @@ class IntervalSums:
         """Return the intervals in these rows."""
         return IntervalSums(**{name: getattr(self, name)[rows] for name in self.__dataclass_fields__})
 
-    def by_block(
-        self, change: Callable[["IntervalSums"], "IntervalSums"], in_place: bool = False
-    ) -> "IntervalSums":
-        """Return the intervals after a change of each alone; ``change`` gets some of them at a time.
+    def changed(self, change: Callable[["IntervalSums", Integers], "IntervalSums"]) -> "IntervalSums":
+        """Return the intervals after a change of each alone; ``change`` gets them, and their numbers."""
+        return change(self, np.arange(len(self)))
 
-        ``in_place``: in the memory of these, which are lost.
-        """
-        empty = {} if in_place else {name: np.empty_like(values) for name, values in vars(self).items()}
-        changed = replace(self, **empty)
-        for start in range(0, len(self), BLOCK):
-            rows = slice(start, start + BLOCK)
-            for name, values in vars(change(self.selected(rows))).items():
-                getattr(changed, name)[rows] = values
-        return changed
+    def stored(self, change: Callable[["IntervalSums"], "IntervalSums"]) -> "IntervalSums":
+        """Return the intervals after a change of each alone."""
+        return change(self)
 
     def shifted(self, change: Array) -> "IntervalSums":
         """Return the sums of the same observations after v has changed by q · ``change`` (g, F).
@@ -96,6 +131,14 @@ class IntervalSums:
             right_swept=self.right_swept + np.einsum("gij,gj->gi", self.swept, change),
             squares=self.squares + np.einsum("gi,gi->g", change, 2 * self.right + shift),
         )
+
+
+def blocks(sums: Intervals, rows: Integers | None = None) -> Iterator[IntervalSums]:
+    """Yield the intervals in these rows (all by default), at most BLOCK at a time, so that memory stays small."""
+    count = len(sums) if rows is None else len(rows)
+    for start in range(0, count, BLOCK):
+        some = slice(start, min(start + BLOCK, count))
+        yield sums.selected(some if rows is None else rows[some])
 
 
 @dataclass(frozen=True)
@@ -185,26 +228,14 @@ def interval_sums(points: LinearisedPoints) -> IntervalSums:
     return merged([sums.selected(np.flatnonzero(normal[:, 0, 0] > 0))])
 
 
-def let_go(pieces: list[IntervalSums]) -> Iterator[IntervalSums]:
-    """Yield the pieces one by one and keep none, so that :func:`merged` can give their memory back."""
-    while pieces:
-        yield pieces.pop(0)
-
-
 def merged(pieces: Iterable[IntervalSums]) -> IntervalSums:
-    """Return the sums of all batches together, in order; an interval may be spread over several batches.
-
-    Pieces to which nothing else refers give their memory back one field after the other.
-    """
-    parts = [dict(vars(piece)) for piece in pieces]
-    record, surface = (np.concatenate([part.pop(name) for part in parts]) for name in ("record", "surface"))
+    """Return the sums of all batches together, in order; an interval may be spread over several batches."""
+    parts = list(pieces)
+    together = {
+        name: np.concatenate([getattr(piece, name) for piece in parts]) for name in IntervalSums.__dataclass_fields__
+    }
+    record, surface = together.pop("record"), together.pop("surface")
     order = np.lexsort((surface, record))
     first = Runs.of(record[order], surface[order]).starts
-    sorted_already = bool(np.all(order[1:] > order[:-1]))
-
-    def added(name: str) -> Array:
-        together = np.concatenate([part.pop(name) for part in parts])
-        return np.asarray(np.add.reduceat(together if sorted_already else together[order], first))
-
-    sums = {name: added(name) for name in list(IntervalSums.__dataclass_fields__)[2:]}
+    sums = {name: np.add.reduceat(values[order], first) for name, values in together.items()}
     return IntervalSums(record=record[order[first]], surface=surface[order[first]], **sums)

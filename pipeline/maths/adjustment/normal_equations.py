@@ -37,7 +37,7 @@ from pipeline.maths.adjustment.eliminate_white_noise import (
     TimeAxis,
     eliminate_white_noise,
 )
-from pipeline.maths.adjustment.interval_sums import BLOCK, IntervalSums
+from pipeline.maths.adjustment.interval_sums import BLOCK, Intervals, IntervalSums
 from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.pose_errors import (
     DriftEstimate,
@@ -57,13 +57,13 @@ class Linearisation:
     ``mapper``, like ``map``, spreads the elimination of the records' noise.
     """
 
-    sums: Mapping[str, IntervalSums]
+    sums: Mapping[str, Intervals]
     state: State
     body: BodyMotion
     drift: DriftEstimate | None = None
     mapper: Callable[..., Iterable[Any]] = map
 
-    def with_sums(self, sensor: str, sums: IntervalSums) -> "Linearisation":
+    def with_sums(self, sensor: str, sums: Intervals) -> "Linearisation":
         """Return this linearisation with other sums of one sensor."""
         return replace(self, sums={**self.sums, sensor: sums})
 
@@ -163,7 +163,7 @@ def reduced_by_group(
     return eliminate_white_noise(sources, n_parameters, times, white, group, linearisation.mapper)
 
 
-def updated_sums(linearisation: Linearisation, step: Array, drift_step: DriftEstimate) -> dict[str, IntervalSums]:
+def updated_sums(linearisation: Linearisation, step: Array, drift_step: DriftEstimate) -> dict[str, Intervals]:
     """Return the sums after a step of the parameters and of the drift, without reading the points again.
 
     Parameters
@@ -175,7 +175,7 @@ def updated_sums(linearisation: Linearisation, step: Array, drift_step: DriftEst
     drift_step : DriftEstimate
         Step of the drift at its knots.
     """
-    changes = {sensor: np.zeros_like(sums.right) for sensor, sums in linearisation.sums.items()}
+    changes = {sensor: np.zeros((len(sums), sums.features)) for sensor, sums in linearisation.sums.items()}
     for source in linearisation.by_surface():
         for start in range(0, len(source.rows), BLOCK):
             block = slice(start, start + BLOCK)
@@ -184,7 +184,17 @@ def updated_sums(linearisation: Linearisation, step: Array, drift_step: DriftEst
             times = linearisation.body.times(intervals.sums.record, intervals.sums.share)
             change[:, : len(intervals.pose)] += drift_step.at(times) @ intervals.pose.T
             changes[source.sensor][source.rows[block]] = change
-    return {sensor: sums.shifted(changes[sensor]) for sensor, sums in linearisation.sums.items()}
+    return {sensor: sums.changed(_Shift(changes[sensor])) for sensor, sums in linearisation.sums.items()}
+
+
+@dataclass(frozen=True)
+class _Shift:
+    """A change of v by q · ``change``, (g, F) for all intervals."""
+
+    change: Array
+
+    def __call__(self, sums: IntervalSums, numbers: Integers) -> IntervalSums:
+        return sums.shifted(self.change[numbers])
 
 
 def mount_step(linearisation: Linearisation) -> Array:
@@ -195,10 +205,11 @@ def mount_step(linearisation: Linearisation) -> Array:
     """
     normal, right = np.zeros((N_MOUNT, N_MOUNT)), np.zeros(N_MOUNT)
     for source in linearisation.by_surface():
-        intervals = source.linearised(slice(None))
-        design = intervals.design[:, :, np.flatnonzero(intervals.columns < N_MOUNT)]
-        normal += np.einsum("gfi,gfh,ghj->ij", design, intervals.sums.normal, design, optimize=True)
-        right += np.einsum("gfi,gf->i", design, intervals.sums.right)
+        for start in range(0, len(source.rows), BLOCK):
+            intervals = source.linearised(slice(start, start + BLOCK))
+            design = intervals.design[:, :, np.flatnonzero(intervals.columns < N_MOUNT)]
+            normal += np.einsum("gfi,gfh,ghj->ij", design, intervals.sums.normal, design, optimize=True)
+            right += np.einsum("gfi,gf->i", design, intervals.sums.right)
     scale = 1 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
     step = np.zeros(linearisation.state.size)
     step[:N_MOUNT] = -scale * np.linalg.lstsq(normal * np.outer(scale, scale), scale * right, rcond=1e-9)[0]

@@ -41,7 +41,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.maths.adjustment.design_matrix import pose_design
-from pipeline.maths.adjustment.interval_sums import N_MOVED, IntervalSums
+from pipeline.maths.adjustment.interval_sums import N_MOVED, Intervals, IntervalSums, blocks
 from pipeline.maths.adjustment.parameters import ObservedSurface
 from pipeline.maths.adjustment.weighting import FEWEST, FLAT, EpochVarianceFactor
 
@@ -76,13 +76,13 @@ class PingNoise:
 
 
 def ping_noise(
-    sums: IntervalSums, surfaces: Sequence[ObservedSurface], white: Array, laser: EpochVarianceFactor
+    sums: Intervals, surfaces: Sequence[ObservedSurface], white: Array, laser: EpochVarianceFactor
 ) -> PingNoise:
     """Return the noise that the soundings of a ping share.
 
     Parameters
     ----------
-    sums : IntervalSums
+    sums : Intervals
         The sonar's intervals.
     surfaces : sequence of ObservedSurface
         The surfaces, in the order of their numbers in the sums.
@@ -91,8 +91,8 @@ def ping_noise(
     laser : EpochVarianceFactor
         Variance factor f of this noise, from the laser's points.
     """
-    count, white_covariance = len(surfaces), _white_covariance(sums, surfaces, white)
-    means, slopes = _mean_differences(sums, white_covariance), _slope_differences(sums, white_covariance)
+    count, lines = len(surfaces), _Lines.of(sums, surfaces, white)
+    means, slopes = lines.mean_differences(), lines.slope_differences()
     effects, epoch = DesignEffects(np.ones(count), np.ones(count)), laser
     for _ in range(ROUNDS):
         epoch = means.epoch_factor(effects.of_mean, epoch.factor)
@@ -103,7 +103,7 @@ def ping_noise(
 
 
 def with_ping_noise(
-    sums: IntervalSums, noise: PingNoise, surfaces: Sequence[ObservedSurface], white: Array, in_place: bool = False
+    sums: IntervalSums, noise: PingNoise, surfaces: Sequence[ObservedSurface], white: Array
 ) -> IntervalSums:
     """Return the sums of the sonar's intervals with the noise that the soundings of a ping share.
 
@@ -117,15 +117,7 @@ def with_ping_noise(
         The surfaces, in the order of their numbers in the sums.
     white : (6,) array
         Standard deviations of a record's white noise, m and rad.
-    in_place : bool
-        Whether they take the memory of ``sums``, which are lost.
     """
-    return sums.by_block(lambda block: _block_with_ping_noise(block, noise, surfaces, white), in_place)
-
-
-def _block_with_ping_noise(
-    sums: IntervalSums, noise: PingNoise, surfaces: Sequence[ObservedSurface], white: Array
-) -> IntervalSums:
     sums = with_design_effects(sums, noise.effects)
     if noise.excess <= 0:
         return sums
@@ -209,51 +201,86 @@ class _Differences:
         return EpochVarianceFactor(factor, sigma)
 
 
-def _pairs(sums: IntervalSums, enough: NDArray[np.bool_]) -> tuple[Integers, Integers]:
-    """Return the intervals in the mask (g,) that have a successor, and this successor: their rows (n,) each."""
-    first, second = [], []
-    for surface in np.unique(sums.surface):
-        rows = np.flatnonzero((sums.surface == surface) & enough)
-        record = sums.record[rows]
-        place = np.searchsorted(record, record + 2)
-        found = np.flatnonzero(place < len(rows))
-        step = record[place[found]] - record[found]
-        near = step <= NEAR * np.median(step) if len(step) else np.zeros(0, dtype=bool)
-        first.append(rows[found[near]])
-        second.append(rows[place[found[near]]])
-    none = [np.empty(0, dtype=np.int64)]
-    return np.concatenate(first + none), np.concatenate(second + none)
+@dataclass(frozen=True)
+class _Lines:
+    """The line of each ping's soundings on a surface: what the differences of successive ones need, (g,) each.
 
+    record, surface: numbers; total: Σ w; mean; spread: Σ w τ²; along (g, 2): its direction a; slope: along a; of_mean,
+    of_slope: uᵀ U u and aᵀ U' a; sloping: whether the slope is determined.
+    """
 
-def _mean_differences(sums: IntervalSums, white_covariance: Array) -> _Differences:
-    """Return the differences of the means of successive intervals; ``white_covariance`` U (g, 3, 3)."""
-    total = sums.normal[:, 0, 0]
-    u = sums.normal[:, 0, :N_MOVED] / total[:, None]
-    common = np.einsum("gi,gij,gj->g", u, white_covariance, u)
-    first, second = _pairs(sums, np.ones(len(sums), dtype=bool))
-    own = 1 / total[first] + 1 / total[second]
-    mean = sums.right[:, 0] / total
-    return _Differences(
-        (mean[second] - mean[first]) ** 2 / own, (common[first] + common[second]) / own, sums.surface[first]
-    )
+    record: Integers
+    surface: Integers
+    total: Array
+    mean: Array
+    spread: Array
+    along: Array
+    slope: Array
+    of_mean: Array
+    of_slope: Array
+    sloping: NDArray[np.bool_]
 
+    @classmethod
+    def of(cls, sums: Intervals, surfaces: Sequence[ObservedSurface], white: Array) -> "_Lines":
+        parts = [vars(cls._of_block(block, surfaces, white)) for block in blocks(sums)]
+        return cls(**{name: np.concatenate([part[name] for part in parts]) for name in cls.__dataclass_fields__})
 
-def _slope_differences(sums: IntervalSums, white_covariance: Array) -> _Differences:
-    """Return the differences of the slopes of successive intervals; ``white_covariance`` U (g, 3, 3)."""
-    C, right = _centred(sums)
-    values, vectors = np.linalg.eigh(C)
-    spread, along = np.maximum(values[:, 1], LEAST_SPREAD), vectors[:, :, 1]
-    along = along * np.where(along[:, :1] + along[:, 1:] < 0, -1.0, 1.0)
-    slope = np.einsum("gi,gi->g", along, right) / spread
-    common = np.einsum("gi,gij,gj->g", along, white_covariance[:, 1:, 1:], along)
-    first, second = _pairs(sums, (sums.count >= FEWEST) & (values[:, 1] > LEAST_SPREAD))
-    alike = np.einsum("ni,ni->n", along[first], along[second])
-    first, second = first[np.abs(alike) > ALIKE], second[np.abs(alike) > ALIKE]
-    sense = np.sign(alike[np.abs(alike) > ALIKE])
-    own = 1 / spread[first] + 1 / spread[second]
-    return _Differences(
-        (sense * slope[second] - slope[first]) ** 2 / own, (common[first] + common[second]) / own, sums.surface[first]
-    )
+    @classmethod
+    def _of_block(cls, sums: IntervalSums, surfaces: Sequence[ObservedSurface], white: Array) -> "_Lines":
+        U, total = _white_covariance(sums, surfaces, white), sums.normal[:, 0, 0]
+        u = sums.normal[:, 0, :N_MOVED] / total[:, None]
+        C, right = _centred(sums)
+        values, vectors = np.linalg.eigh(C)
+        spread, along = np.maximum(values[:, 1], LEAST_SPREAD), vectors[:, :, 1]
+        along = along * np.where(along[:, :1] + along[:, 1:] < 0, -1.0, 1.0)
+        return cls(
+            record=sums.record,
+            surface=sums.surface,
+            total=total,
+            mean=sums.right[:, 0] / total,
+            spread=spread,
+            along=along,
+            slope=np.einsum("gi,gi->g", along, right) / spread,
+            of_mean=np.einsum("gi,gij,gj->g", u, U, u),
+            of_slope=np.einsum("gi,gij,gj->g", along, U[:, 1:, 1:], along),
+            sloping=(sums.count >= FEWEST) & (values[:, 1] > LEAST_SPREAD),
+        )
+
+    def mean_differences(self) -> _Differences:
+        """Return the differences of the means of successive intervals."""
+        first, second = self._pairs(np.ones(len(self.record), dtype=bool))
+        squared = (self.mean[second] - self.mean[first]) ** 2
+        return self._differences(squared, first, second, self.total, self.of_mean)
+
+    def slope_differences(self) -> _Differences:
+        """Return the differences of the slopes of successive intervals."""
+        first, second = self._pairs(self.sloping)
+        alike = np.einsum("ni,ni->n", self.along[first], self.along[second])
+        near = np.abs(alike) > ALIKE
+        first, second, sense = first[near], second[near], np.sign(alike[near])
+        squared = (sense * self.slope[second] - self.slope[first]) ** 2
+        return self._differences(squared, first, second, self.spread, self.of_slope)
+
+    def _differences(
+        self, squared: Array, first: Integers, second: Integers, weight: Array, common: Array
+    ) -> _Differences:
+        own = 1 / weight[first] + 1 / weight[second]
+        return _Differences(squared / own, (common[first] + common[second]) / own, self.surface[first])
+
+    def _pairs(self, enough: NDArray[np.bool_]) -> tuple[Integers, Integers]:
+        """Return the intervals in the mask (g,) that have a successor, and this successor: their rows (n,) each."""
+        first, second = [], []
+        for surface in np.unique(self.surface):
+            rows = np.flatnonzero((self.surface == surface) & enough)
+            record = self.record[rows]
+            place = np.searchsorted(record, record + 2)
+            found = np.flatnonzero(place < len(rows))
+            step = record[place[found]] - record[found]
+            near = step <= NEAR * np.median(step) if len(step) else np.zeros(0, dtype=bool)
+            first.append(rows[found[near]])
+            second.append(rows[place[found[near]]])
+        none = [np.empty(0, dtype=np.int64)]
+        return np.concatenate(first + none), np.concatenate(second + none)
 
 
 def _centred(sums: IntervalSums) -> tuple[Array, Array]:

@@ -20,7 +20,8 @@ which repeat their information in part, take up to a third off it.
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.maths.adjustment.interval_sums import N_MOVED, IntervalSums
+from pipeline.maths.adjustment.interval_sums import BLOCK, N_MOVED, Intervals, blocks
+from pipeline.maths.adjustment.pose_errors import N_POSE
 from pipeline.maths.adjustment.weighting import EpochVarianceFactor
 
 Array = NDArray[np.float64]
@@ -29,21 +30,25 @@ OVERLAP = 1.5  # variance of f from pairs of neighbours, by its variance if they
 ROUNDS = 3  # of the regression, first with f = 1
 
 
-def record_noise_factor(sums: IntervalSums, pose_designs: Array, white: Array) -> EpochVarianceFactor:
+def record_noise_factor(sums: Intervals, pose_designs: Array, white: Array) -> EpochVarianceFactor:
     """Return the variance factor of the records' white noise, and its sigma (infinite: unknown).
 
     Parameters
     ----------
-    sums : IntervalSums
+    sums : Intervals
         The laser's intervals, at the adjusted values.
     pose_designs : (s, 3, 6) array
         Design K of pose errors by surface.
     white : (6,) array
         Standard deviations of a record's white noise, m and rad.
     """
-    information = sums.normal[:, 0, 0]
-    g = np.einsum("gi,gij->gj", sums.normal[:, 0, :N_MOVED] / information[:, None], pose_designs[sums.surface]) * white
-    mean, own, share = sums.right[:, 0] / information, 1 / information, sums.share[:, None]
+    g, (mean, own, share) = np.empty((len(sums), N_POSE)), np.empty((3, len(sums)))
+    for start, block in zip(range(0, len(sums), BLOCK), blocks(sums), strict=True):
+        rows, information = slice(start, start + BLOCK), block.normal[:, 0, 0]
+        of_moved = block.normal[:, 0, :N_MOVED] / information[:, None]
+        g[rows] = np.einsum("gi,gij->gj", of_moved, pose_designs[block.surface]) * white
+        mean[rows], own[rows], share[rows] = block.right[:, 0] / information, 1 / information, block.share
+    share = share[:, None]
     before, after = (1 - share) * g, share * g  # of the record before the interval, and of that after it
     order = np.lexsort((sums.record, sums.surface))
     parts = []

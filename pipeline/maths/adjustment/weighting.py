@@ -34,7 +34,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.maths.adjustment.interval_sums import N_MOVED, IntervalSums
+from pipeline.maths.adjustment.interval_sums import N_MOVED, Intervals, IntervalSums, blocks
 from pipeline.maths.adjustment.pose_errors import N_POSE, PoseNoise
 from pipeline.maths.adjustment.robust_weights import igg3_weights, variance_kept
 
@@ -65,14 +65,12 @@ class Scatter:
         return self.squares / self.dof if self.dof > 0 else 1.0
 
 
-def scatter(
-    sums: IntervalSums, rows: NDArray[np.bool_], kept: float, edge_shares: Array | None = None
-) -> Scatter:
+def scatter(sums: Intervals, rows: NDArray[np.bool_], kept: float, edge_shares: Array | None = None) -> Scatter:
     """Return the scatter of some intervals together. Intervals of few points are left out.
 
     Parameters
     ----------
-    sums : IntervalSums
+    sums : Intervals
         The sensor's intervals.
     rows : (g,) array of bool
         Those that are used.
@@ -81,7 +79,13 @@ def scatter(
     edge_shares : (s,) array, optional
         Edge shares κ by surface, by which the weights of the sums are divided; by default 1.
     """
-    use = np.flatnonzero(rows & (sums.count >= FEWEST))
+    parts = [_scatter(block, edge_shares) for block in blocks(sums, np.flatnonzero(rows))]
+    return Scatter(sum(squares for squares, _ in parts), kept * sum(freedom for _, freedom in parts))
+
+
+def _scatter(sums: IntervalSums, edge_shares: Array | None) -> tuple[float, float]:
+    """Return Σ w v² about the planes of some intervals, and the degrees of freedom."""
+    use = np.flatnonzero(sums.count >= FEWEST)
     normal, right = sums.normal[use, :N_MOVED, :N_MOVED], sums.right[use, :N_MOVED]
     scale = 1 / np.sqrt(np.maximum(np.einsum("gii->gi", normal), 1e-300))
     values, vectors = np.linalg.eigh(normal * scale[:, :, None] * scale[:, None, :])
@@ -90,14 +94,15 @@ def scatter(
     fitted = np.sum(np.where(determined, along**2 / np.where(determined, values, 1.0), 0.0), axis=1)
     count, share = sums.count[use], 1.0 if edge_shares is None else edge_shares[sums.surface[use]]
     freedom = (count - determined.sum(axis=1) * sums.squared_count[use] / count) / share
-    return Scatter(float(np.sum(sums.squares[use] - fitted)), kept * float(np.sum(freedom)))
+    return float(np.sum(sums.squares[use] - fitted)), float(np.sum(freedom))
 
 
-def edge_shares(sums: IntervalSums, n_surfaces: int) -> Array:
+def edge_shares(sums: Intervals, n_surfaces: int) -> Array:
     """Return the edge share κ = Σ e² / Σ e (s,) of each surface; 1 without points."""
-    count, squared = (
-        np.bincount(sums.surface, weights=part, minlength=n_surfaces) for part in (sums.count, sums.squared_count)
-    )
+    count, squared = np.zeros((2, n_surfaces))
+    for block in blocks(sums):
+        for total, part in ((count, block.count), (squared, block.squared_count)):
+            total += np.bincount(block.surface, weights=part, minlength=n_surfaces)
     return np.divide(squared, count, out=np.ones(n_surfaces), where=count > 0)
 
 
@@ -130,14 +135,12 @@ def _drawn(factors: Array, dof: Array, prior: float) -> float:
     return float((PRIOR_DOF * prior + dof @ factors) / (PRIOR_DOF + dof.sum()))
 
 
-def rescaled(sums: IntervalSums, divisors: Array, in_place: bool = False) -> IntervalSums:
-    """Return the sums with the weights divided by a number for each surface, (s,); ``in_place``: in their memory."""
+def rescaled(sums: IntervalSums, divisors: Array) -> IntervalSums:
+    """Return the sums with the weights divided by a number for each surface, (s,)."""
     share = 1 / divisors[sums.surface]
     names = ("normal", "swept", "swept_twice", "right", "right_swept", "squares")
-    changed = {}
-    for name in names:
-        part = getattr(sums, name)
-        changed[name] = np.multiply(part, share.reshape(-1, *[1] * (part.ndim - 1)), out=part if in_place else None)
+    parts = {name: getattr(sums, name) for name in names}
+    changed = {name: part * share.reshape(-1, *[1] * (part.ndim - 1)) for name, part in parts.items()}
     return replace(sums, **changed)
 
 

@@ -54,21 +54,6 @@ def test_sums_of_batches_are_the_sums() -> None:
         np.testing.assert_allclose(getattr(parts, name), getattr(whole, name), rtol=1e-12, atol=1e-13)
 
 
-@pytest.mark.parametrize("in_place", [False, True])
-def test_a_change_block_by_block_is_the_change_of_all(monkeypatch: pytest.MonkeyPatch, in_place: bool) -> None:
-    monkeypatch.setattr("pipeline.maths.adjustment.interval_sums.BLOCK", 7)
-    sums = summed(slice(None), *points(8))
-    rows, half = len(sums), np.full(4, 2.0)
-    assert rows > 7
-    assert rows % 7
-    expected, before = rescaled(sums, half), sums.selected(np.arange(rows))
-    changed = sums.by_block(lambda block: rescaled(block, half), in_place)
-    for name in IntervalSums.__dataclass_fields__:
-        np.testing.assert_array_equal(getattr(changed, name), getattr(expected, name))
-        assert np.shares_memory(getattr(changed, name), getattr(sums, name)) == in_place
-    assert np.array_equal(sums.normal, before.normal) != in_place
-
-
 def test_sums_moved_are_those_of_moved_observations() -> None:
     record, share, surface, q, weight, v = given = points(7)
     sums = summed(slice(None), *given)
