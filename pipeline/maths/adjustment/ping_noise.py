@@ -40,19 +40,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.maths.adjustment.design_matrix import pose_design
-from pipeline.maths.adjustment.interval_sums import N_MOVED, Intervals, IntervalSums, blocks
+from pipeline.maths.adjustment.interval_sums import N_MOVED, Intervals, IntervalSums
 from pipeline.maths.adjustment.parameters import ObservedSurface
-from pipeline.maths.adjustment.weighting import FEWEST, FLAT, EpochVarianceFactor
+from pipeline.maths.adjustment.ping_differences import (
+    CERTAIN,
+    LEAST_SPREAD,
+    ROUNDS,
+    Lines,
+    centred,
+    outer,
+    white_covariance,
+)
+from pipeline.maths.adjustment.weighting import FLAT, EpochVarianceFactor
 
 Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
-CERTAIN = 3.0  # sigmas by which an error must exceed what is expected, to be taken into the model
-ROUNDS = 3  # of each estimation in turn
-OVERLAP = 1.5  # variance of an estimate from overlapping differences over that from independent ones
-NEAR = 3.0  # an interval farther from its successor than this multiple of the usual distance is left out
-ALIKE = 0.9  # cosine of the directions of two lines whose slopes are compared
-LEAST_SPREAD = 1e-300  # smallest divisor
 
 
 @dataclass(frozen=True)
@@ -91,7 +92,7 @@ def ping_noise(
     laser : EpochVarianceFactor
         Variance factor f of this noise, from the laser's points.
     """
-    count, lines = len(surfaces), _Lines.of(sums, surfaces, white)
+    count, lines = len(surfaces), Lines.of(sums, surfaces, white)
     means, slopes = lines.mean_differences(), lines.slope_differences()
     effects, epoch = DesignEffects(np.ones(count), np.ones(count)), laser
     for _ in range(ROUNDS):
@@ -121,7 +122,7 @@ def with_ping_noise(
     sums = with_design_effects(sums, noise.effects)
     if noise.excess <= 0:
         return sums
-    U = noise.excess * _white_covariance(sums, surfaces, white)
+    U = noise.excess * white_covariance(sums, surfaces, white)
     of_moved = sums.normal[:, :N_MOVED]
     inverse = np.linalg.solve(np.eye(N_MOVED) + U @ of_moved[:, :, :N_MOVED], U)
     by_moved, swept = np.swapaxes(of_moved, 1, 2) @ inverse, sums.swept[:, :, :N_MOVED]
@@ -150,144 +151,13 @@ def with_design_effects(sums: IntervalSums, effects: DesignEffects) -> IntervalS
 
     return replace(
         sums,
-        normal=divided(sums.normal, _outer(weighted, weighted / total[:, None])),
-        swept=divided(sums.swept, _outer(swept, weighted / total[:, None])),
-        swept_twice=divided(sums.swept_twice, _outer(swept, swept / total[:, None])),
+        normal=divided(sums.normal, outer(weighted, weighted / total[:, None])),
+        swept=divided(sums.swept, outer(swept, weighted / total[:, None])),
+        swept_twice=divided(sums.swept_twice, outer(swept, swept / total[:, None])),
         right=divided(sums.right, weighted * mean[:, None]),
         right_swept=divided(sums.right_swept, swept * mean[:, None]),
         squares=sums.squares - mean**2 * total * (1 - 1 / d_mean) - fitted * (1 - 1 / d_slope),
     )
-
-
-def _outer(first: Array, second: Array) -> Array:
-    return first[:, :, None] * second[:, None, :]
-
-
-@dataclass(frozen=True)
-class _Differences:
-    """Differences of successive pings (n,) with E y² = d + (f + x) g: y², g, and the number of their surface."""
-
-    squared: Array
-    common: Array
-    surface: Integers
-
-    def design_effects(self, factor: float, n_surfaces: int) -> Array:
-        """Return d by surface (s,), with f + x = ``factor``; 1 where it is not certainly larger."""
-        effects = np.ones(n_surfaces)
-        for surface in range(n_surfaces):
-            rows = self.surface == surface
-            common, squared = max(factor, 0.0) * self.common[rows], self.squared[rows]
-            if not np.any(rows):
-                continue
-            certain = 1 + CERTAIN * np.sqrt(OVERLAP * 2 / np.sum((1 + common) ** -2))
-            d = 1.0
-            for _ in range(ROUNDS):
-                weight = (max(d, 1.0) + common) ** -2
-                d = float(weight @ (squared - common) / weight.sum())
-            effects[surface] = d if d > certain else 1.0
-        return effects
-
-    def epoch_factor(self, effects: Array, factor: float) -> EpochVarianceFactor:
-        """Return f + x, with the design effects (s,) and a first value of it."""
-        d = effects[self.surface]
-        sigma = np.inf
-        for _ in range(ROUNDS):
-            by_variance = self.common / (d + max(factor, 0.0) * self.common) ** 2
-            information = float(by_variance @ self.common)
-            if information <= 0:
-                return EpochVarianceFactor(1.0, np.inf)
-            factor = float(by_variance @ (self.squared - d)) / information
-            sigma = float(np.sqrt(OVERLAP * 2 / information))
-        return EpochVarianceFactor(factor, sigma)
-
-
-@dataclass(frozen=True)
-class _Lines:
-    """The line of each ping's soundings on a surface: what the differences of successive ones need, (g,) each.
-
-    record, surface: numbers; total: Σ w; mean; spread: Σ w τ²; along (g, 2): its direction a; slope: along a; of_mean,
-    of_slope: uᵀ U u and aᵀ U' a; sloping: whether the slope is determined.
-    """
-
-    record: Integers
-    surface: Integers
-    total: Array
-    mean: Array
-    spread: Array
-    along: Array
-    slope: Array
-    of_mean: Array
-    of_slope: Array
-    sloping: NDArray[np.bool_]
-
-    @classmethod
-    def of(cls, sums: Intervals, surfaces: Sequence[ObservedSurface], white: Array) -> "_Lines":
-        parts = [vars(cls._of_block(block, surfaces, white)) for block in blocks(sums)]
-        return cls(**{name: np.concatenate([part[name] for part in parts]) for name in cls.__dataclass_fields__})
-
-    @classmethod
-    def _of_block(cls, sums: IntervalSums, surfaces: Sequence[ObservedSurface], white: Array) -> "_Lines":
-        U, total = _white_covariance(sums, surfaces, white), sums.normal[:, 0, 0]
-        u = sums.normal[:, 0, :N_MOVED] / total[:, None]
-        C, right = _centred(sums)
-        values, vectors = np.linalg.eigh(C)
-        spread, along = np.maximum(values[:, 1], LEAST_SPREAD), vectors[:, :, 1]
-        along = along * np.where(along[:, :1] + along[:, 1:] < 0, -1.0, 1.0)
-        return cls(
-            record=sums.record,
-            surface=sums.surface,
-            total=total,
-            mean=sums.right[:, 0] / total,
-            spread=spread,
-            along=along,
-            slope=np.einsum("gi,gi->g", along, right) / spread,
-            of_mean=np.einsum("gi,gij,gj->g", u, U, u),
-            of_slope=np.einsum("gi,gij,gj->g", along, U[:, 1:, 1:], along),
-            sloping=(sums.count >= FEWEST) & (values[:, 1] > LEAST_SPREAD),
-        )
-
-    def mean_differences(self) -> _Differences:
-        """Return the differences of the means of successive intervals."""
-        first, second = self._pairs(np.ones(len(self.record), dtype=bool))
-        squared = (self.mean[second] - self.mean[first]) ** 2
-        return self._differences(squared, first, second, self.total, self.of_mean)
-
-    def slope_differences(self) -> _Differences:
-        """Return the differences of the slopes of successive intervals."""
-        first, second = self._pairs(self.sloping)
-        alike = np.einsum("ni,ni->n", self.along[first], self.along[second])
-        near = np.abs(alike) > ALIKE
-        first, second, sense = first[near], second[near], np.sign(alike[near])
-        squared = (sense * self.slope[second] - self.slope[first]) ** 2
-        return self._differences(squared, first, second, self.spread, self.of_slope)
-
-    def _differences(
-        self, squared: Array, first: Integers, second: Integers, weight: Array, common: Array
-    ) -> _Differences:
-        own = 1 / weight[first] + 1 / weight[second]
-        return _Differences(squared / own, (common[first] + common[second]) / own, self.surface[first])
-
-    def _pairs(self, enough: NDArray[np.bool_]) -> tuple[Integers, Integers]:
-        """Return the intervals in the mask (g,) that have a successor, and this successor: their rows (n,) each."""
-        first, second = [], []
-        for surface in np.unique(self.surface):
-            rows = np.flatnonzero((self.surface == surface) & enough)
-            record = self.record[rows]
-            place = np.searchsorted(record, record + 2)
-            found = np.flatnonzero(place < len(rows))
-            step = record[place[found]] - record[found]
-            near = step <= NEAR * np.median(step) if len(step) else np.zeros(0, dtype=bool)
-            first.append(rows[found[near]])
-            second.append(rows[place[found[near]]])
-        none = [np.empty(0, dtype=np.int64)]
-        return np.concatenate(first + none), np.concatenate(second + none)
-
-
-def _centred(sums: IntervalSums) -> tuple[Array, Array]:
-    """Return C = Σ w t tᵀ (g, 2, 2) and Σ w t v (g, 2), t from the interval's centroid."""
-    normal, right = sums.normal[:, :N_MOVED, :N_MOVED], sums.right[:, :N_MOVED]
-    centroid = normal[:, 1:, 0] / normal[:, :1, 0]
-    return normal[:, 1:, 1:] - _outer(centroid, normal[:, 0, 1:]), right[:, 1:] - centroid * right[:, :1]
 
 
 def _squares_of_slopes(sums: IntervalSums) -> Array:
@@ -295,17 +165,9 @@ def _squares_of_slopes(sums: IntervalSums) -> Array:
 
     The scales are those of Σ w α² and Σ w β², as for the scatter.
     """
-    C, right = _centred(sums)
+    C, right = centred(sums)
     scale = 1 / np.sqrt(np.maximum(np.einsum("gii->gi", sums.normal)[:, 1:N_MOVED], LEAST_SPREAD))
-    values, vectors = np.linalg.eigh(C * _outer(scale, scale))
+    values, vectors = np.linalg.eigh(C * outer(scale, scale))
     along = np.einsum("gik,gi->gk", vectors, right * scale)
     determined = values > FLAT
     return np.asarray(np.sum(np.where(determined, along**2 / np.where(determined, values, 1.0), 0.0), axis=1))
-
-
-def _white_covariance(sums: IntervalSums, surfaces: Sequence[ObservedSurface], white: Array) -> Array:
-    """Return c K W Kᵀ (g, 3, 3): the covariance of the coefficients of (1, α, β) by white noise of the records."""
-    designs = pose_design(surfaces, np.arange(len(surfaces)))
-    by_surface = (designs * white**2) @ np.swapaxes(designs, 1, 2)
-    share = sums.share
-    return np.asarray(((1 - share) ** 2 + share**2)[:, None, None] * by_surface[sums.surface])
