@@ -1,0 +1,97 @@
+"""How flat a plane of a point cloud is: its unevenness, its bow, its extent, and how much of it is seen.
+
+The points are gathered in square cells of the plane, not in voxels: a wall that lies along the sides of voxels is cut
+by them at random, and the cut biases the means. The mean distance of a cell's points from the plane has little noise.
+So the RMS of the cells' means is the *unevenness* of the surface itself, on the scale of a cell.
+
+A *bow*, as of a quay built on a curve or a ship's side, is the part of the second order: of the least-squares surface
+a + b u + c w + d u² + e u w + f w² over the cells, u and w along the plane, the largest less the smallest height that
+the terms of second order alone reach after a plane has been fitted to them.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+FEWEST = 4  # points of a cell that counts
+FEWEST_CELLS = 8  # cells for a surface of second order
+
+
+@dataclass(frozen=True)
+class Flatness:
+    """width_m, height_m: extent of the cells along the first and the second axis; uneven_m: RMS of the cells' means.
+
+    bow_m: height that the second order reaches, 0 with few cells; covered: cells with points, as a share of those
+    within the extent.
+    """
+
+    width_m: float
+    height_m: float
+    uneven_m: float
+    bow_m: float
+    covered: float
+
+
+def plane_axes(normal: Array) -> Array:
+    """Return two unit vectors (2, 3) in the plane with this normal: the first level, the second as upright as can be.
+
+    With the normal they make a right-handed system. In a level plane the first points along x.
+
+    >>> plane_axes(np.array([-1.0, 0.0, 0.0])).tolist()
+    [[0.0, -1.0, 0.0], [0.0, 0.0, 1.0]]
+    """
+    level = np.array([-normal[1], normal[0], 0.0])
+    length = float(np.linalg.norm(level))
+    level = level / length if length > 1e-6 else np.array([1.0, 0.0, 0.0])
+    up = np.cross(normal, level)
+    return np.array([level, up / np.linalg.norm(up)]) + 0.0  # no negative zeros
+
+
+def flatness(in_plane_m: Array, away_m: Array, cell_m: float) -> Flatness:
+    """Return how flat a plane is.
+
+    Parameters
+    ----------
+    in_plane_m : (n, 2) array
+        Places of its points along the axes of :func:`plane_axes`, m.
+    away_m : (n,) array
+        Their distances from the plane, m.
+    cell_m : float
+        Length of the side of a cell.
+    """
+    cell = np.floor(in_plane_m / cell_m).astype(np.int64)
+    keys, inverse = np.unique(cell, axis=0, return_inverse=True)
+    inverse = inverse.reshape(-1)
+    count = np.bincount(inverse, minlength=len(keys))
+    use = count >= FEWEST
+    if not use.any():
+        return Flatness(0.0, 0.0, 0.0, 0.0, 0.0)
+    mean = np.bincount(inverse, weights=away_m, minlength=len(keys))[use] / count[use]
+    totals = np.array([np.bincount(inverse, weights=axis, minlength=len(keys)) for axis in in_plane_m.T])
+    place = totals[:, use] / count[use]
+    spans = np.ptp(keys[use], axis=0) + 1
+    width, height = (spans * cell_m).tolist()
+    plane = _design(place)[:, :3]
+    flat = mean - plane @ np.linalg.lstsq(plane, mean, rcond=None)[0]
+    return Flatness(
+        width_m=float(width),
+        height_m=float(height),
+        uneven_m=float(np.sqrt(np.mean(flat**2))),
+        bow_m=_bow(place, mean) if len(mean) >= FEWEST_CELLS and np.all(spans > 2) else 0.0,
+        covered=float(use.sum() / np.prod(spans)),
+    )
+
+
+def _design(place: Array) -> Array:
+    """Return the columns (n, 6) 1, u, w, u², u w, w² of places (2, n)."""
+    u, w = place - place.mean(axis=1, keepdims=True)
+    return np.column_stack([np.ones(len(u)), u, w, u * u, u * w, w * w])
+
+
+def _bow(place: Array, mean: Array) -> float:
+    design = _design(place)
+    second = design[:, 3:] @ np.linalg.lstsq(design, mean, rcond=None)[0][3:]
+    plane = design[:, :3]
+    return float(np.ptp(second - plane @ np.linalg.lstsq(plane, second, rcond=None)[0]))

@@ -1,0 +1,86 @@
+"""Outlines of planes: the convex polygon of points in a plane, made smaller, and cut off at a line.
+
+Coordinates are those in the plane, (n, 2) m; polygons (k, 2) are convex and counter-clockwise.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def convex_hull(points_m: Array) -> Array:
+    """Return the smallest convex polygon round points, from its leftmost corner; empty if they lie on a line.
+
+    Andrew 1979, "Another efficient algorithm for convex hulls in two dimensions": lower and upper chain, corners that
+    turn to the right are taken back.
+
+    >>> convex_hull(np.array([[0.0, 0.0], [2.0, 0.0], [1.0, 0.5], [2.0, 2.0], [0.0, 2.0]])).tolist()
+    [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]
+    """
+    ordered = np.unique(points_m, axis=0)
+    chains = []
+    for points in (ordered, ordered[::-1]):
+        chain: list[Array] = []
+        for point in points:
+            while len(chain) > 1 and _turn(chain[-2], chain[-1], point) <= 0:
+                chain.pop()
+            chain.append(point)
+        chains += chain[:-1]
+    return np.array(chains) if len(chains) > 2 else np.empty((0, 2))
+
+
+def _turn(a: Array, b: Array, c: Array) -> float:
+    """Return twice the area of the triangle a, b, c: above zero if it turns to the left."""
+    return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+
+
+def clipped(polygon_m: Array, inward: Array, offset_m: float) -> Array:
+    """Return the part of a polygon with ``inward · x >= offset_m``; empty if there is none.
+
+    Sutherland & Hodgman 1974, "Reentrant polygon clipping": corners inside stay, edges that cross get a corner there.
+    """
+    if not len(polygon_m):
+        return polygon_m
+    beyond = polygon_m @ inward - offset_m
+    corners = []
+    for k, (point, height) in enumerate(zip(polygon_m, beyond, strict=True)):
+        before, height_before = polygon_m[k - 1], beyond[k - 1]
+        if (height >= 0) != (height_before >= 0):
+            share = height_before / (height_before - height)
+            corners.append(before + share * (point - before))
+        if height >= 0:
+            corners.append(point)
+    found = np.array(corners).reshape(-1, 2)
+    if len(found):
+        found = found[np.any(np.abs(found - np.roll(found, 1, axis=0)) > 0, axis=1)]
+    return found if len(found) > 2 else np.empty((0, 2))
+
+
+def shrunk(polygon_m: Array, margin_m: float) -> Array:
+    """Return the polygon whose edges lie inside those of this one by a margin; empty if it is too narrow."""
+    found = polygon_m
+    for start, end in zip(polygon_m, np.roll(polygon_m, -1, axis=0), strict=True):
+        along = (end - start) / np.linalg.norm(end - start)
+        inward = np.array([-along[1], along[0]])
+        found = clipped(found, inward, float(inward @ start) + margin_m)
+    return found
+
+
+def inside(polygon_m: Array, points_m: Array) -> NDArray[np.bool_]:
+    """Return whether points (n, 2) lie in a polygon or on its edges."""
+    found = np.ones(len(points_m), dtype=bool)
+    for start, end in zip(polygon_m, np.roll(polygon_m, -1, axis=0), strict=True):
+        along, away = end - start, points_m - start
+        found &= along[0] * away[:, 1] - along[1] * away[:, 0] >= 0
+    return found
+
+
+def area(polygon_m: Array) -> float:
+    """Return the area of a polygon, m².
+
+    >>> area(np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 3.0], [0.0, 3.0]]))
+    6.0
+    """
+    after = np.roll(polygon_m, -1, axis=0)
+    return float(np.sum(polygon_m[:, 0] * after[:, 1] - polygon_m[:, 1] * after[:, 0]) / 2)
