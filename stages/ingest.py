@@ -1,7 +1,7 @@
 """Read raw instrument files into streams and tables with the same columns for all formats; quality control."""
 
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import pandas as pd
@@ -37,7 +37,7 @@ from pipeline.readers.file_summaries import (
     refuse_times_of_reception,
     thin_sigmas,
 )
-from pipeline.readers.track_tables import passes_table, pool_frame_table
+from pipeline.readers.track_tables import passes_table, pool_frame_table, trajectory_table
 from pipeline.readers.unsounded_passes import unsounded_passes_table
 
 _OF_A_SOUNDING = ("sound_speed_m_s", "two_way_time_s")
@@ -148,7 +148,7 @@ def combine(prepared: None, partials: dict[str, list[tuple[str, ChunkSummary]]],
     recorded = {name: summaries for name, summaries in partials.items() if name != "mbes" or config.recordings.mbes}
     refuse_empty_sensors(recorded)
     refuse_times_of_reception(partials["mbes"])
-    trajectory, repeated = _trajectory([summary.trajectory for _, summary in partials["ins"] if summary.count])
+    trajectory, repeated = trajectory_table([summary.trajectory for _, summary in partials["ins"] if summary.count])
     ins_t = trajectory["t_ns"].to_numpy()
     epochs = {
         sensor: np.unique(np.concatenate([summary.epochs_ns for _, summary in partials[sensor]]))
@@ -181,18 +181,6 @@ def _one_a_second(t_ns: NDArray[np.int64]) -> NDArray[np.int64]:
     ordered = t_ns if np.all(t_ns[1:] >= t_ns[:-1]) else np.sort(t_ns)
     first = np.flatnonzero(np.diff(ordered // NS, prepend=-1))
     return np.append(ordered[first], ordered[-1])
-
-
-def _trajectory(chunks: list[dict[str, NDArray[Any]]]) -> tuple[pd.DataFrame, int]:
-    """Return the INS records in order of time, and the number left out: only the first of equal times is kept."""
-    chunks = sorted(chunks, key=lambda columns: int(columns["t_ns"][0]))
-    table = pd.DataFrame(
-        {c.name: np.concatenate([columns[c.name] for columns in chunks]) for c in TRAJECTORY.columns}
-    )
-    order = np.argsort(table["t_ns"].to_numpy(), kind="stable")
-    table = table.iloc[order]
-    kept = np.diff(table["t_ns"].to_numpy(), prepend=np.iinfo(np.int64).min // 2) > 0
-    return table[kept].reset_index(drop=True), int((~kept).sum())
 
 
 def _sigmas(summaries: Summaries, start: int, end: int) -> tuple[pd.DataFrame, int]:

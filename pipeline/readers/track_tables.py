@@ -1,14 +1,33 @@
-"""Tables that follow from the boat's track (INS records): the pool frame and the passes."""
+"""Tables of the boat's track (INS records): the trajectory, the pool frame and the passes."""
+
+from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from pipeline.artefacts.catalogue.points import TRAJECTORY
+from pipeline.artefacts.streams import Batch
 from pipeline.config.pool import TargetPlace
 from pipeline.errors import RawDataError
 from pipeline.gps_time import NS
 from pipeline.maths.geometry.geodesy import PoolFrame, ecef_from_geodetic
 from pipeline.maths.geometry.passes import estimate_azimuth, find_passes, pass_of
+
+
+def trajectory_table(chunks: Sequence[Batch]) -> tuple[pd.DataFrame, int]:
+    """Return the table ``trajectory``, INS records in order of time, and the number left out.
+
+    Of equal times only the first is kept.
+    """
+    chunks = sorted(chunks, key=lambda columns: int(columns["t_ns"][0]))
+    table = pd.DataFrame(
+        {c.name: np.concatenate([columns[c.name] for columns in chunks]) for c in TRAJECTORY.columns}
+    )
+    order = np.argsort(table["t_ns"].to_numpy(), kind="stable")
+    table = table.iloc[order]
+    kept = np.diff(table["t_ns"].to_numpy(), prepend=np.iinfo(np.int64).min // 2) > 0
+    return table[kept].reset_index(drop=True), int((~kept).sum())
 
 
 def pool_frame_table(trajectory: pd.DataFrame, target: TargetPlace) -> tuple[pd.DataFrame, PoolFrame]:

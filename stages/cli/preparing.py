@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from stages.cli.application import app
-from stages.cli.arguments import POOL_FILE, AsJson, Pool, Session, SessionYaml
+from stages.cli.arguments import POOL_FILE, AsJson, Jobs, Pool, Session, SessionYaml
 
 
 @app.command("init")
@@ -36,6 +36,19 @@ def _check(
     from stages.commands import check
 
     return check.command(session, config, as_json)
+
+
+@app.command("target")
+def _target(
+    session: Session,
+    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="write a pool's config with them")] = None,
+    depth: Annotated[float, typer.Option("--depth", metavar="M", help="depth of the water at the wall")] = 4.0,
+    jobs: Jobs = None,
+) -> int:
+    """Find walls and slopes that can serve as a target, in the laser's points."""
+    from stages.commands import target
+
+    return target.command(session, out, depth, jobs)
 
 
 @app.command("plan")

@@ -43,6 +43,26 @@ def ecef_from_geodetic(latitude_rad: Array, longitude_rad: Array, height_m: Arra
     )
 
 
+def geodetic_from_ecef(point_ecef_m: Array) -> tuple[float, float, float]:
+    """Return latitude and longitude (rad) and ellipsoidal height (m) of a point (3,) in ECEF, near the earth's surface.
+
+    Fixed point of tan φ = (Z + e² N sin φ) / p, p = √(X² + Y²): each step divides the error by 1 / e² or more, so that
+    twelve leave less than rounding.
+
+    >>> geodetic_from_ecef(ecef_from_geodetic(np.array(0.6), np.array(2.1), np.array(12.0)))
+    (0.6, 2.1, 12.000...)
+    """
+    x, y, z = point_ecef_m.tolist()
+    p = float(np.hypot(x, y))
+    latitude = float(np.arctan2(z, p * (1 - ECCENTRICITY_SQUARED)))
+    for _ in range(12):
+        n = SEMI_MAJOR_M / np.sqrt(1 - ECCENTRICITY_SQUARED * np.sin(latitude) ** 2)
+        latitude = float(np.arctan2(z + ECCENTRICITY_SQUARED * n * np.sin(latitude), p))
+    n = SEMI_MAJOR_M / np.sqrt(1 - ECCENTRICITY_SQUARED * np.sin(latitude) ** 2)
+    height = p * np.cos(latitude) + z * np.sin(latitude) - n * (1 - ECCENTRICITY_SQUARED * np.sin(latitude) ** 2)
+    return latitude, float(np.arctan2(y, x)), float(height)
+
+
 def rotation_ecef_from_level(latitude_rad: Array, longitude_rad: Array) -> Array:
     """Return ``R_ecef_from_level`` (n, 3, 3) at places (n,): its columns are east, north, up."""
     sin_lat, cos_lat = np.sin(latitude_rad), np.cos(latitude_rad)

@@ -67,6 +67,15 @@ def shrunk(polygon_m: Array, margin_m: float) -> Array:
     return found
 
 
+def simplified(polygon_m: Array, corners: int) -> Array:
+    """Return the polygon with at most these corners; those that cut off least are left out, so it lies inside."""
+    found = list(polygon_m)
+    while len(found) > max(corners, 3):
+        cut = [_turn(found[k - 1], found[k], found[(k + 1) % len(found)]) for k in range(len(found))]
+        found.pop(int(np.argmin(cut)))
+    return np.array(found).reshape(-1, 2)
+
+
 def inside(polygon_m: Array, points_m: Array) -> NDArray[np.bool_]:
     """Return whether points (n, 2) lie in a polygon or on its edges."""
     found = np.ones(len(points_m), dtype=bool)

@@ -63,6 +63,10 @@ class Voxels:
         found[:, ROWS, COLUMNS] = found[:, COLUMNS, ROWS] = self.second / self.count[:, None]
         return found - mean[:, :, None] * mean[:, None, :]
 
+    def code_of(self, points_m: Array) -> Integers:
+        """Return the numbers (m,) of the voxels in which points (m, 3) lie."""
+        return _code(np.floor(points_m / self.size_m).astype(np.int64))
+
     def selected(self, rows: Integers | NDArray[np.bool_]) -> "Voxels":
         """Return these voxels, ascending as they are here."""
         return Voxels(self.size_m, self.code[rows], self.count[rows], self.first[rows], self.second[rows])

@@ -1,0 +1,157 @@
+"""Planes above the water in the laser's points: which can serve, which cannot and why, and where the water is."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.errors import RawDataError
+from pipeline.maths.surfaces.flatness import Flatness, flatness, plane_axes
+from pipeline.maths.surfaces.growing import GrowthLimits, Plane, grown_regions, plane_of_voxels
+from pipeline.maths.surfaces.outline import convex_hull, shrunk, simplified
+from pipeline.maths.surfaces.voxels import voxels_of
+
+Array = NDArray[np.float64]
+VOXEL_M, CELL_M = 0.3, 0.25
+GROWTH = GrowthLimits(thickness_m=0.03, distance_m=0.045, least_voxels=12)
+OFF_M = 0.15  # points of a plane's voxels farther off belong to something in front of it
+MARGIN_M, CORNERS = 0.1, 8  # of the outline: inside the outermost points; most corners
+LEAST_M, UNEVEN_M, BOW_M, COVERED = 1.0, 0.03, 0.03, 0.4  # extent; RMS; height of a bow; share of the cells seen
+LEVEL_DEG = 10.0  # a plane that is less inclined is a deck, a quay's top or the water
+NEAR_WATER_M = 0.5  # largest height of a plane's lower end above the water
+COLUMN_SPREAD_M, FEWEST_COLUMNS = 0.1, 6  # columns of points that end at the water
+
+
+@dataclass(frozen=True)
+class DryPlane:
+    """A plane of the cloud, frame of the points: ``normal · x = distance_m``, the normal toward the boat.
+
+    outline_m (k, 2): its dry part along ``plane_axes(normal)``; lowest_m: z of its lower end; column_ends_m: z at which
+    columns of its points end; refused: why it cannot serve, "" if it can.
+    """
+
+    normal: Array
+    distance_m: float
+    rms_m: float
+    points: int
+    flat: Flatness
+    outline_m: Array
+    lowest_m: float
+    column_ends_m: Array
+    refused: str = ""
+
+    @property
+    def tilt_deg(self) -> float:
+        """Return the inclination from level, 90: upright; above 90: it overhangs."""
+        return float(np.degrees(np.arccos(np.clip(self.normal[2], -1.0, 1.0))))
+
+    def corners_m(self, outline_m: Array) -> Array:
+        """Return the corners (k, 3) of an outline (k, 2) in the plane."""
+        return np.asarray(outline_m @ plane_axes(self.normal) + self.distance_m * self.normal)
+
+
+def dry_planes(points_m: Array, boat_m: Array) -> list[DryPlane]:
+    """Return the planes among points (n, 3), the largest first; boat_m (3,): where the boat was in the mean."""
+    voxels = voxels_of(points_m, VOXEL_M)
+    regions = grown_regions(voxels, GROWTH)
+    row = np.searchsorted(voxels.code, voxels.code_of(points_m))
+    number = np.full(len(voxels), -1)
+    for k, rows in enumerate(regions):
+        number[rows] = k
+    of_point = number[row]
+    order = np.argsort(of_point, kind="stable")
+    ends = np.searchsorted(of_point[order], np.arange(len(regions) + 1))
+    found = [
+        _plane(points_m[order[ends[k] : ends[k + 1]]], plane_of_voxels(voxels, rows), boat_m)
+        for k, rows in enumerate(regions)
+    ]
+    return sorted(found, key=lambda plane: -plane.flat.width_m * plane.flat.height_m)
+
+
+def _plane(points_m: Array, plane: Plane, boat_m: Array) -> DryPlane:
+    sense = 1.0 if plane.normal @ boat_m > plane.distance_m else -1.0
+    normal, distance_m = sense * plane.normal, sense * plane.distance_m
+    away = points_m @ normal - distance_m
+    on = np.abs(away) <= OFF_M
+    in_plane, heights = points_m[on] @ plane_axes(normal).T, points_m[on, 2]
+    flat = flatness(in_plane, away[on], CELL_M)
+    outline = simplified(shrunk(convex_hull(_cell_means(in_plane)), MARGIN_M), CORNERS)
+    made = DryPlane(
+        normal=normal,
+        distance_m=distance_m,
+        rms_m=plane.rms_m,
+        points=int(on.sum()),
+        flat=flat,
+        outline_m=outline,
+        lowest_m=float(np.quantile(heights, 0.01)) if len(heights) else np.inf,
+        column_ends_m=_column_ends(in_plane[:, 0], heights),
+    )
+    return replace(made, refused=_refusal(made))
+
+
+def _cell_means(in_plane_m: Array) -> Array:
+    """Return the means (c, 2) of the points in each cell: single points far out make no outline."""
+    cells, inverse, count = np.unique(
+        np.floor(in_plane_m / CELL_M).astype(np.int64), axis=0, return_inverse=True, return_counts=True
+    )
+    sums = np.array([np.bincount(inverse.reshape(-1), weights=axis, minlength=len(cells)) for axis in in_plane_m.T])
+    return np.asarray((sums / count).T[count >= 4])
+
+
+def _column_ends(along_m: Array, heights_m: Array) -> Array:
+    """Return the height (c,) of the lowest points of each column of a cell's width that has points enough."""
+    column = np.floor(along_m / CELL_M).astype(np.int64)
+    order = np.lexsort((heights_m, column))
+    starts = np.flatnonzero(np.diff(column[order], prepend=column.min(initial=0) - 1))
+    counts = np.diff(starts, append=len(order))
+    use = counts >= 20
+    return np.asarray(heights_m[order][starts[use] + counts[use] // 50])
+
+
+def _refusal(plane: DryPlane) -> str:
+    """Return why a plane cannot serve, without regard to the water; "" if it can."""
+    flat, tilt = plane.flat, plane.tilt_deg
+    if min(tilt, 180 - tilt) < LEVEL_DEG:
+        return "level"
+    if min(flat.width_m, flat.height_m) < LEAST_M or len(plane.outline_m) < 3:
+        return f"smaller than {LEAST_M:g} m"
+    if flat.uneven_m > UNEVEN_M:
+        return f"uneven, {1000 * flat.uneven_m:.0f} mm"
+    if flat.bow_m > BOW_M:
+        return f"bent by {1000 * flat.bow_m:.0f} mm"
+    if flat.covered < COVERED:
+        return f"only {100 * flat.covered:.0f} % of it seen"
+    return ""
+
+
+def water_level_m(planes: Sequence[DryPlane]) -> float:
+    """Return the height at which the planes' points end: the middle of the densest ends of their columns.
+
+    Walls that end higher (on piles, behind a fender) end at other heights, and are fewer.
+
+    Raises
+    ------
+    RawDataError
+        Too few columns end at one height.
+    """
+    ends = np.sort(np.concatenate([plane.column_ends_m for plane in planes if not plane.refused] or [np.empty(0)]))
+    within = np.searchsorted(ends, ends + COLUMN_SPREAD_M, "right") - np.arange(len(ends))
+    if not len(ends) or within.max() < FEWEST_COLUMNS:
+        raise RawDataError(
+            "laser: no wall or slope whose points end at one height, the water's; pass nearer to a wall, so that the "
+            "laser sees it down to the water"
+        )
+    first = int(np.argmax(within))
+    return float(np.median(ends[first : first + within[first]]))
+
+
+def reaching_water(planes: Sequence[DryPlane], level_m: float) -> list[DryPlane]:
+    """Return the planes, with those refused besides that end above the water, or lie below it."""
+    found = []
+    for plane in planes:
+        above = plane.lowest_m - level_m
+        if not plane.refused and above > NEAR_WATER_M:
+            plane = replace(plane, refused=f"ends {above:.1f} m above the water")
+        found.append(plane)
+    return found

@@ -1,0 +1,130 @@
+"""The target frame of a found place, and its faces in it, continued below the water."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import radians
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.errors import RawDataError
+from pipeline.finding.dry_planes import DryPlane
+from pipeline.maths.geometry.geodesy import PoolFrame, geodetic_from_ecef
+from pipeline.maths.surfaces.flatness import plane_axes
+from pipeline.maths.surfaces.outline import clipped, convex_hull
+
+Array = NDArray[np.float64]
+UPRIGHT_DEG = 20.0  # a wall may lean by this; what leans more is a slope
+FOOT_M = 0.5  # height of the strip at the lower end of a face's dry part, by whose width it goes on below the water
+AWAY = 0.1  # largest x of a face's normal: passes lie at x < 0, and a face must look there
+DIGITS, ANGLE_DIGITS = 3, 9  # decimals of metres, and of latitude and longitude
+
+
+@dataclass(frozen=True)
+class FoundFace:
+    """A face: its name, and its corners (k, 3), counter-clockwise as the boat sees them, target frame."""
+
+    name: str
+    corners_m: Array
+    plane: DryPlane
+
+
+@dataclass(frozen=True)
+class FoundPlace:
+    """A target: origin and azimuth, the height of the water in its frame, its faces.
+
+    planes: all that were found; read, used: numbers of laser points.
+    """
+
+    latitude_deg: float
+    longitude_deg: float
+    height_m: float
+    azimuth_deg: float
+    water_level_m: float
+    faces: tuple[FoundFace, ...]
+    planes: tuple[DryPlane, ...]
+    read: int = 0
+    used: int = 0
+
+
+def found_place(planes: Sequence[DryPlane], level_m: float, frame: PoolFrame, depth_m: float) -> FoundPlace:
+    """Return the target that these planes make.
+
+    x goes into the largest wall, y along it, so that it lies to starboard of a boat that passes toward +y; the origin
+    is on the wall, at the water, in the middle of the wall's dry part.
+
+    Parameters
+    ----------
+    planes : sequence of DryPlane
+        All planes, in the given frame.
+    level_m : float
+        Height of the water there.
+    frame : PoolFrame
+        The planes' frame, with its y axis to the north.
+    depth_m : float
+        Depth below the water to which faces are continued.
+
+    Raises
+    ------
+    RawDataError
+        No wall can serve.
+    """
+    walls = [plane for plane in planes if not plane.refused and abs(plane.tilt_deg - 90) < UPRIGHT_DEG]
+    if not walls:
+        raise RawDataError(
+            f"laser: no upright wall that can serve among {len(planes)} planes; pass nearer to one, and slowly"
+        )
+    main = walls[0]
+    ahead = -main.normal[:2] / np.linalg.norm(main.normal[:2])  # x, horizontal
+    azimuth_deg = round(float(np.degrees(np.arctan2(-ahead[1], ahead[0]))) % 360, DIGITS)  # y = (-ahead_y, ahead_x)
+    middle = main.corners_m(_at_height(main, level_m).mean(axis=0)[None])[0]
+    latitude, longitude, height = geodetic_from_ecef(frame.points_to_ecef(middle[None])[0])
+    latitude_deg, longitude_deg = (round(float(np.degrees(angle)), ANGLE_DIGITS) for angle in (latitude, longitude))
+    height_m = round(height, DIGITS)
+    target = PoolFrame.at(radians(latitude_deg), radians(longitude_deg), height_m, radians(azimuth_deg))
+    water = target.points_from_ecef(frame.points_to_ecef(middle[None]))[0, 2]
+    judged, faces = [], []
+    for plane in planes:
+        corners = target.points_from_ecef(frame.points_to_ecef(plane.corners_m(_continued(plane, level_m, depth_m))))
+        if not plane.refused and _normal(corners)[0] > AWAY:
+            plane = replace(plane, refused="looks away from the passes beside the largest wall")
+        judged.append(plane)
+        if not plane.refused:
+            faces.append((plane, np.round(corners, DIGITS)))
+    return FoundPlace(
+        latitude_deg, longitude_deg, height_m, azimuth_deg, round(float(water), DIGITS), _named(faces), tuple(judged)
+    )
+
+
+def _at_height(plane: DryPlane, level_m: float) -> Array:
+    """Return the two ends (2, 2), along the plane's axes, of a face's foot, moved to a height."""
+    _, up = plane_axes(plane.normal)
+    base = plane.distance_m * plane.normal[2]
+    height = (level_m - base) / up[2]
+    lowest = max(float(plane.outline_m[:, 1].min()), height)
+    foot = clipped(plane.outline_m, np.array([0.0, -1.0]), -(lowest + FOOT_M))
+    foot = foot if len(foot) else plane.outline_m
+    return np.array([[foot[:, 0].min(), height], [foot[:, 0].max(), height]])
+
+
+def _continued(plane: DryPlane, level_m: float, depth_m: float) -> Array:
+    """Return the outline (k, 2) of a face with its part below the water: a hypothesis, which the soundings test."""
+    if len(plane.outline_m) < 3:
+        return np.zeros((3, 2))
+    return convex_hull(np.concatenate([plane.outline_m, _at_height(plane, level_m - depth_m)]))
+
+
+def _normal(corners_m: Array) -> Array:
+    normal = np.cross(corners_m - corners_m[0], np.roll(corners_m, -1, axis=0) - corners_m[0]).sum(axis=0)
+    return np.asarray(normal / max(float(np.linalg.norm(normal)), 1e-300))
+
+
+def _named(faces: Sequence[tuple[DryPlane, Array]]) -> tuple[FoundFace, ...]:
+    """Return the faces with names: walls and slopes, numbered along y."""
+    counts = {"wall": 0, "slope": 0}
+    named = []
+    for plane, corners in sorted(faces, key=lambda face: float(face[1][:, 1].mean())):
+        kind = "wall" if abs(plane.tilt_deg - 90) < UPRIGHT_DEG else "slope"
+        counts[kind] += 1
+        named.append(FoundFace(f"{kind}-{counts[kind]}", corners, plane))
+    return tuple(named)

@@ -1,0 +1,47 @@
+"""``poolcal target``: walls and slopes that can serve as a target, found in a session's laser points."""
+
+import sys
+from pathlib import Path
+
+from pipeline.artefacts.streams import Stream
+from pipeline.atomic_files import write_text
+from pipeline.config.load import load_session
+from pipeline.config.stage_settings import LaserPlacement
+from pipeline.errors import ConfigError
+from pipeline.finding.find import find_place
+from pipeline.finding.found_text import table_text
+from pipeline.finding.pool_file import FIRST, pool_yaml
+from pipeline.language.speaking import say
+from pipeline.readers.casts import with_cast
+from pipeline.readers.dispatch import raw_parts
+from pipeline.run.output_files import refuse_output
+from pipeline.run.workers import workers
+
+
+def command(folder: Path, out: Path | None, depth_m: float, jobs: int | None) -> int:
+    """Print the planes that were found; write them as a pool's config.
+
+    Parameters
+    ----------
+    folder
+        The session folder.
+    out
+        The config to write; None: none is written.
+    depth_m
+        Depth below the water to which faces are continued.
+    jobs
+        Number of workers.
+    """
+    if not 0.5 <= depth_m <= 100:
+        raise ConfigError(f"--depth {depth_m:g}: must be 0.5 to 100 m, the depth of the water at the wall")
+    refuse_output("--out", out, suffix=".yaml", begins=FIRST.encode())
+    session = load_session(folder, with_cast)
+    with workers(jobs, None) as pool:
+        ins = Stream(raw_parts("ins", session.ins, folder), pool.map, pool.here)
+        laser = Stream(raw_parts("laser", session.laser, folder), pool.map, pool.here)
+        place = find_place(ins, laser, LaserPlacement(mount=session.laser.mount, frame=session.laser.frame), depth_m)
+    say(table_text(place), sys.stdout)
+    if out is not None:
+        write_text(out, pool_yaml(place))
+        say(f"\nWritten: {out}", sys.stdout)
+    return 0

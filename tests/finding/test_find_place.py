@@ -1,0 +1,84 @@
+"""A target found in the laser's points of a simulated session, held against the truth of the simulator."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from pipeline.artefacts.streams import MemoryPart, Stream
+from pipeline.config.pool import PoolConfig
+from pipeline.config.session import SessionConfig
+from pipeline.config.stage_settings import LaserPlacement
+from pipeline.config.yaml_models import parse
+from pipeline.finding.find import find_place
+from pipeline.finding.found_text import table_text
+from pipeline.finding.place import FoundPlace
+from pipeline.finding.pool_file import pool_yaml
+from pipeline.maths.geometry.geodesy import PoolFrame
+from pipeline.maths.target.model import TargetModel
+from pipeline.simulation.session import SimulatedSession
+from pipeline.target.design import target_of
+from tests.support.simulated import made
+
+DOCK: dict[str, Any] = {  # a quay wall with two returns and a slipway beside it, which dips under the water
+    "target": {
+        "kind": "faces",
+        "origin": {"latitude_deg": 36.0, "longitude_deg": 120.1, "height_m": 12.0},
+        "azimuth_deg": 20.0,
+        "faces": {
+            "wall": {"corners": [[0, 3, -4], [0, -3, -4], [0, -3, 2], [0, 3, 2]]},
+            "south": {"corners": [[0, -3, -4], [2, -5, -4], [2, -5, 2], [0, -3, 2]]},
+            "north": {"corners": [[2, 5, -4], [0, 3, -4], [0, 3, 2], [2, 5, 2]]},
+        },
+    },
+    "surroundings": {"back_wall": False},
+    "track": {"distances_m": [4.0, 7.0], "half_length_m": 6.0},
+}
+
+
+def turned(azimuth_deg: float, water_level_m: float = 0.0) -> dict[str, Any]:
+    return DOCK | {"target": DOCK["target"] | {"azimuth_deg": azimuth_deg, "water_level_m": water_level_m}}
+
+
+def found(session: SimulatedSession, depth_m: float = 4.0) -> FoundPlace:
+    settings = parse(SessionConfig, session.session, "session")
+    raw = {"ins": session.ins, "laser": session.laser}
+    streams = (Stream((MemoryPart(name, columns),)) for name, columns in raw.items())
+    return find_place(*streams, LaserPlacement(mount=settings.laser.mount, frame=settings.laser.frame), depth_m)
+
+
+def planes_level(pool: PoolConfig) -> tuple[PoolFrame, TargetModel]:
+    """The target's frame, and its model."""
+    origin, azimuth = pool.target.origin, pool.target.azimuth_deg
+    assert azimuth is not None
+    place = np.radians([origin.latitude_deg, origin.longitude_deg])
+    return PoolFrame.at(*place, origin.height_m, float(np.radians(azimuth))), target_of(pool.target)
+
+
+@pytest.mark.parametrize(("azimuth_deg", "water_level_m"), [(20.0, 0.0), (183.0, -0.4)])
+def test_a_dock_is_found_where_it_is(azimuth_deg: float, water_level_m: float) -> None:
+    session = made(turned(azimuth_deg, water_level_m))
+    place = found(session)
+    assert [face.name for face in place.faces] == ["wall-1", "wall-2", "wall-3"]
+    config = parse(PoolConfig, yaml.safe_load(pool_yaml(place)), "pool")
+    frame, model = planes_level(config)
+    true_frame, truth = planes_level(parse(PoolConfig, session.pool, "pool"))
+    for mine, true in zip(model.faces, [truth.faces[1], truth.faces[0], truth.faces[2]], strict=True):
+        corners = true_frame.points_from_ecef(frame.points_to_ecef(mine.vertices_m))
+        assert np.abs(corners @ true.normal - true.distance_m).max() < 0.06  # with the INS's drift
+        low, high = true.vertices_m.min(axis=0) - 0.1, true.vertices_m.max(axis=0) + 0.1
+        assert np.all((corners[:, :2] > low[:2]) & (corners[:, :2] < high[:2])), mine.name
+        assert 1.5 < corners[:, 2].max() < 2.0
+        assert corners[:, 2].min() == pytest.approx(water_level_m - 4.0, abs=0.1)
+    assert config.target.azimuth_deg == pytest.approx(azimuth_deg, abs=0.3)
+    there = true_frame.points_from_ecef(frame.points_to_ecef(np.zeros((1, 3))))[0]
+    assert abs(there[0]) < 0.05
+    level = there[2] + config.target.water_level_m
+    assert level == pytest.approx(water_level_m, abs=0.08)
+
+
+def test_the_screen_says_what_serves_and_why_the_rest_does_not() -> None:
+    said = table_text(found(made(turned(20.0))))
+    assert "3 faces of" in said
+    assert "wall-2" in said
