@@ -14,10 +14,10 @@ from pipeline.maths.surfaces.voxels import voxels_of
 
 Array = NDArray[np.float64]
 VOXEL_M, CELL_M = 0.3, 0.25
-GROWTH = GrowthLimits(thickness_m=0.03, distance_m=0.045, least_voxels=12)
+GROWTH = GrowthLimits(thickness_m=0.03, distance_m=0.06, least_voxels=12)
 OFF_M = 0.15  # points of a plane's voxels farther off belong to something in front of it
 MARGIN_M, CORNERS = 0.1, 8  # of the outline: inside the outermost points; most corners
-LEAST_M, UNEVEN_M, BOW_M, COVERED = 1.0, 0.03, 0.03, 0.4  # extent; RMS; height of a bow; share of the cells seen
+LEAST_M, UNEVEN_M, BOW_M, COVERED = 1.0, 0.03, 0.03, 0.6  # extent; RMS; height of a bow; share of the cells seen
 LEVEL_DEG = 10.0  # a plane that is less inclined is a deck, a quay's top or the water
 NEAR_WATER_M = 0.5  # largest height of a plane's lower end above the water
 COLUMN_SPREAD_M, FEWEST_COLUMNS = 0.1, 6  # columns of points that end at the water

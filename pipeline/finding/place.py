@@ -92,7 +92,13 @@ def found_place(planes: Sequence[DryPlane], level_m: float, frame: PoolFrame, de
         if not plane.refused:
             faces.append((plane, np.round(corners, DIGITS)))
     return FoundPlace(
-        latitude_deg, longitude_deg, height_m, azimuth_deg, round(float(water), DIGITS), _named(faces), tuple(judged)
+        latitude_deg=latitude_deg,
+        longitude_deg=longitude_deg,
+        height_m=height_m,
+        azimuth_deg=azimuth_deg,
+        water_level_m=round(float(water), DIGITS) + 0.0,  # no -0.0
+        faces=_named(faces),
+        planes=tuple(judged),
     )
 
 

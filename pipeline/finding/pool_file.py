@@ -1,6 +1,8 @@
 """A found place as a pool's config."""
 
-from pipeline.finding.place import FoundPlace
+import numpy as np
+
+from pipeline.finding.place import DIGITS, FoundPlace
 
 FIRST = "# A target found by poolcal target in the laser's points. Strike faces that are no wall below the water:"
 AS_BUILT = """\
@@ -24,6 +26,7 @@ def pool_yaml(place: FoundPlace) -> str:
         "  faces:                        # corners in m: x into the largest wall, y along it, z up",
     ]
     for face in place.faces:
-        corners = ", ".join("[" + ", ".join(f"{value + 0.0:.3f}" for value in row) + "]" for row in face.corners_m)
+        rows = np.round(face.corners_m, DIGITS) + 0.0  # no -0.0
+        corners = ", ".join("[" + ", ".join(f"{value:.{DIGITS}f}" for value in row) + "]" for row in rows)
         lines.append(f"    {face.name}: {{corners: [{corners}]}}")
     return "\n".join(lines) + "\n" + AS_BUILT

@@ -23,6 +23,7 @@ from pipeline.target.search_results import LocatedTarget
 from pipeline.target.surface import ClosestSurface
 
 Array = NDArray[np.float64]
+LEAST_M = 0.02  # errors that points share: in what moves them by less over the whole search they tell nothing
 TILT_SIGMAS = (0.1, 0.1, 0.1, 1.0, 1.0, 1.0)  # rad and m: so large that only the points count
 
 
@@ -54,7 +55,7 @@ def search_target_pose(
     coarse = _best_start(TargetPose(dry.voxel_means_m, sigmas), surface, model.half_period_m, azimuth_known)
     label = dry_labeller(model, settings)
     points = TargetPose(dry.points_m, sigmas)
-    pose = refine(points, coarse.parameters, label, surface.planes)
+    pose = refine(points, coarse.parameters, label, surface.planes, least_m=LEAST_M)
     frame = TargetFrame(rotation_z(pose.parameters[0]), pose.parameters[1:])
     tilted = TiltedTarget(points.points(pose.parameters), np.array(TILT_SIGMAS))
     return LocatedTarget(

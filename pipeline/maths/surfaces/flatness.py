@@ -21,7 +21,7 @@ FEWEST_CELLS = 8  # cells for a surface of second order
 
 @dataclass(frozen=True)
 class Flatness:
-    """width_m, height_m: extent of the cells along the first and the second axis; uneven_m: RMS of the cells' means.
+    """width_m, height_m: extent along the first and the second axis of the cells' points; uneven_m: RMS of their means.
 
     bow_m: height that the second order reaches, 0 with few cells; covered: cells with points, as a share of those
     within the extent.
@@ -72,7 +72,7 @@ def flatness(in_plane_m: Array, away_m: Array, cell_m: float) -> Flatness:
     totals = np.array([np.bincount(inverse, weights=axis, minlength=len(keys)) for axis in in_plane_m.T])
     place = totals[:, use] / count[use]
     spans = np.ptp(keys[use], axis=0) + 1
-    width, height = (spans * cell_m).tolist()
+    width, height = np.ptp(in_plane_m[use[inverse]], axis=0).tolist()
     plane = _design(place)[:, :3]
     flat = mean - plane @ np.linalg.lstsq(plane, mean, rcond=None)[0]
     return Flatness(

@@ -1,0 +1,67 @@
+"""poolcal target: from a session without a design to a calibration on what the laser saw, and what is refused."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from pipeline.config.load import load_pool
+from tests.support.places import poolcal, simulate
+from tests.support.refusals import one_line
+
+DOCK: dict[str, Any] = {
+    "target": {
+        "kind": "faces",
+        "origin": {"latitude_deg": 36.0, "longitude_deg": 120.1, "height_m": 12.0},
+        "azimuth_deg": 20.0,
+        "faces": {
+            "wall": {"corners": [[0, 3, -4], [0, -3, -4], [0, -3, 2], [0, 3, 2]]},
+            "south": {"corners": [[0, -3, -4], [2, -5, -4], [2, -5, 2], [0, -3, 2]]},
+            "north": {"corners": [[2, 5, -4], [0, 3, -4], [0, 3, 2], [2, 5, 2]]},
+        },
+    },
+    "surroundings": {"back_wall": False},
+}
+
+
+@pytest.fixture(scope="module")
+def dock(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A session at a wall with two returns."""
+    folder = tmp_path_factory.mktemp("dock") / "码头 [1]"
+    return simulate(folder, **DOCK, track={"half_length_m": 6.0}, laser={"point_rate_hz": 8000.0})
+
+
+def test_from_the_laser_alone_to_a_calibration(dock: Path, tmp_path: Path) -> None:
+    found = [tmp_path / f"wall-{jobs}.yaml" for jobs in (1, 2)]
+    for jobs, file in enumerate(found, start=1):
+        told = poolcal("target", dock, "--out", file, "--jobs", jobs)
+        assert told.status == 0, told.err
+    assert "3 faces of" in told.out
+    assert f"Written: {found[1]}" in told.out
+    assert found[0].read_bytes() == found[1].read_bytes()
+    assert sorted(load_pool(found[0]).target.faces) == ["wall-1", "wall-2", "wall-3"]
+    run = tmp_path / "run"
+    told = poolcal("run", dock, "--config", found[0], "--run", run)
+    assert told.status in (0, 1), told.err
+    assert told.ran[-1] == "report"
+
+
+def test_the_depth_is_that_of_the_faces(dock: Path, tmp_path: Path) -> None:
+    file = tmp_path / "wall.yaml"
+    assert poolcal("target", dock, "--out", file, "--depth", 2.5).status == 0
+    for face in yaml.safe_load(file.read_text(encoding="utf-8"))["target"]["faces"].values():
+        assert min(corner[2] for corner in face["corners"]) == pytest.approx(-2.5, abs=0.1)
+
+
+@pytest.mark.parametrize("depth", ["0", "-4", "1000", "nan"])
+def test_a_depth_that_cannot_be_is_refused(dock: Path, depth: str) -> None:
+    one_line(poolcal("target", dock, f"--depth={depth}"), "--depth", "must be 0.5 to 100 m")
+
+
+def test_a_file_of_somebody_elses_is_not_replaced(dock: Path, tmp_path: Path) -> None:
+    file = tmp_path / "pool.yaml"
+    file.write_text("target: mine\n", encoding="utf-8")
+    one_line(poolcal("target", dock, "--out", file), str(file))
+    assert file.read_text(encoding="utf-8") == "target: mine\n"
+    one_line(poolcal("target", dock, "--out", tmp_path / "pool.txt"), "ends in .yaml")

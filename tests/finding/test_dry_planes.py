@@ -1,0 +1,105 @@
+"""Planes that can serve and planes that cannot, both sides of each limit; the height of the water."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from pipeline.errors import RawDataError
+from pipeline.finding.dry_planes import (
+    BOW_M,
+    COVERED,
+    NEAR_WATER_M,
+    UNEVEN_M,
+    DryPlane,
+    dry_planes,
+    reaching_water,
+    water_level_m,
+)
+
+Array = np.ndarray
+FAR, BOAT = np.array([300.0, -700.0, 9.0]), np.array([294.0, -700.0, 9.5])  # the boat lies to the west
+WATER_M = 8.0
+
+
+def wall(width_m: float, height_m: float, shape: Callable[[Array, Array], Array] | None = None, seed: int = 1) -> Array:
+    """Points (n, 3) of a wall that looks to the west and stands in the water."""
+    rng, n = np.random.default_rng(seed), round(600 * width_m * height_m)
+    along, up = rng.uniform(-width_m / 2, width_m / 2, n), rng.uniform(0, height_m, n)
+    off = rng.normal(0, 0.005, n) + (0.0 if shape is None else shape(along, up))
+    return np.column_stack([FAR[0] + off, FAR[1] + along, WATER_M + up])
+
+
+def largest(points: Array) -> DryPlane:
+    return dry_planes(points, BOAT)[0]
+
+
+def test_a_plain_wall_serves_and_looks_to_the_boat() -> None:
+    plane = largest(wall(8.0, 3.0))
+    assert plane.refused == ""
+    np.testing.assert_allclose(plane.normal, [-1, 0, 0], atol=2e-4)
+    assert plane.tilt_deg == pytest.approx(90.0, abs=0.05)
+    corners = plane.corners_m(plane.outline_m)
+    np.testing.assert_allclose(corners.max(axis=0) - corners.min(axis=0), [0, 7.6, 2.6], atol=0.2)
+    np.testing.assert_allclose(corners[:, 0], FAR[0], atol=0.01)
+    from_the_other_side = dry_planes(wall(8.0, 3.0), BOAT + np.array([20.0, 0, 0]))[0]
+    np.testing.assert_allclose(from_the_other_side.normal, -plane.normal, atol=1e-9)
+    assert from_the_other_side.distance_m == pytest.approx(-plane.distance_m)
+
+
+@pytest.mark.parametrize(("share", "refused"), [(0.8, ""), (1.3, "bent by")])
+def test_a_bent_wall_does_not_serve(share: float, refused: str) -> None:
+    plane = largest(wall(8.0, 3.0, lambda along, _: share * BOW_M * (along / 4.0) ** 2))
+    assert plane.refused.startswith(refused)
+    assert bool(plane.refused) == bool(refused)
+
+
+@pytest.mark.parametrize(("share", "serves"), [(0.8, True), (1.25, False)])
+def test_a_wall_of_uneven_stones_does_not_serve(share: float, serves: bool) -> None:
+    """Each stone of half a metre stands out or back: as an uneven plane, or as two with holes."""
+    stones = share * UNEVEN_M * np.random.default_rng(5).choice([-1.0, 1.0], size=(20, 8))
+    plane = largest(wall(8.0, 3.0, lambda along, up: stones[(2 * (along + 4)).astype(int), (2 * up).astype(int)]))
+    assert (plane.refused == "") == serves
+    assert plane.refused.startswith(("uneven", "only")) != serves
+
+
+@pytest.mark.parametrize(("size", "refused"), [((0.8, 3.0), "smaller than"), ((1.3, 3.0), ""), ((8.0, 0.7), "smaller")])
+def test_a_small_plane_does_not_serve(size: tuple[float, float], refused: str) -> None:
+    plane = largest(wall(*size))
+    assert plane.refused.startswith(refused)
+    assert bool(plane.refused) == bool(refused)
+
+
+@pytest.mark.parametrize(("seen", "refused"), [(COVERED + 0.15, ""), (COVERED - 0.15, "only")])
+def test_a_wall_with_holes_does_not_serve(seen: float, refused: str) -> None:
+    points = wall(8.0, 3.0)
+    row, column = (np.floor(2 * (points[:, k] - points[:, k].min())).astype(int) for k in (1, 2))
+    kept = np.random.default_rng(4).uniform(size=(17, 7)) < seen  # squares of half a metre
+    plane = largest(points[kept[row, column]])
+    assert plane.refused.startswith(refused)
+    assert bool(plane.refused) == bool(refused)
+
+
+def test_a_deck_is_level() -> None:
+    rng = np.random.default_rng(2)
+    deck = FAR + np.column_stack([rng.uniform(0, 6, 20_000), rng.uniform(0, 6, 20_000), rng.normal(0, 0.005, 20_000)])
+    assert largest(deck).refused == "level"
+
+
+@pytest.mark.parametrize(("above_m", "refused"), [(NEAR_WATER_M - 0.2, ""), (NEAR_WATER_M + 0.2, "ends 0.7 m above")])
+def test_a_wall_on_piles_does_not_serve(above_m: float, refused: str) -> None:
+    high = wall(6.0, 3.0, seed=2) + np.array([0.0, 20.0, above_m])
+    planes = dry_planes(np.concatenate([wall(12.0, 3.0), high]), BOAT)
+    level = water_level_m(planes)
+    assert level == pytest.approx(WATER_M, abs=0.06)
+    assert [plane.refused.startswith(refused) for plane in reaching_water(planes, level)] == [refused == "", True]
+    assert bool(reaching_water(planes, level)[1].refused) == bool(refused)
+
+
+def test_without_a_wall_there_is_no_water() -> None:
+    with pytest.raises(RawDataError, match="no wall or slope whose points end at one height"):
+        water_level_m([])
+    ragged = wall(8.0, 4.0)
+    ends = WATER_M + 2.5 * np.random.default_rng(3).uniform(size=40)[np.floor(ragged[:, 1] * 4).astype(int) % 40]
+    with pytest.raises(RawDataError, match="no wall or slope"):
+        water_level_m(dry_planes(ragged[ragged[:, 2] > ends], BOAT))

@@ -1,0 +1,71 @@
+"""The sample of the laser's points: it does not depend on how they are read, and it has its limit."""
+
+import numpy as np
+import pytest
+
+from pipeline.artefacts.streams import MemoryPart, Stream
+from pipeline.config.session import SessionConfig
+from pipeline.config.stage_settings import LaserPlacement
+from pipeline.config.yaml_models import parse
+from pipeline.errors import RawDataError
+from pipeline.finding.kept_points import FARTHEST_M, KeptPoints, kept_points, level_context, scattered
+from pipeline.mount import mount_of
+from pipeline.readers.track_tables import trajectory_table
+from pipeline.simulation.session import SimulatedSession
+from tests.support.simulated import made
+
+TRACK = {"track": {"distances_m": [4.0, 7.0], "half_length_m": 3.6}}
+
+
+@pytest.fixture(scope="module")
+def session() -> SimulatedSession:
+    return made(TRACK)
+
+
+def kept(session: SimulatedSession, parts: int, shift_ns: int = 0) -> KeptPoints:
+    laser = parse(SessionConfig, session.session, "session").laser
+    columns = dict(session.laser) | {"t_ns": session.laser["t_ns"] + shift_ns}
+    ends = np.linspace(0, len(columns["t_ns"]), parts + 1).astype(int)
+    pieces = [
+        MemoryPart(str(k), {name: values[ends[k] : ends[k + 1]] for name, values in columns.items()})
+        for k in range(parts)
+    ]
+    context = level_context(trajectory_table([session.ins])[0])
+    return kept_points(Stream(tuple(pieces)), context, LaserPlacement(mount=laser.mount, frame=laser.frame))
+
+
+@pytest.mark.parametrize("most", [10**9, 5000])
+def test_the_sample_is_the_same_however_the_points_are_divided(
+    session: SimulatedSession, most: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pipeline.finding.kept_points.MOST", most)
+    one, seven = kept(session, 1), kept(session, 7)
+    assert one.read == seven.read == len(session.laser["t_ns"])
+    np.testing.assert_array_equal(one.t_ns, seven.t_ns)
+    np.testing.assert_array_equal(one.level_m, seven.level_m)
+    assert np.all(np.diff(one.t_ns) >= 0)
+    assert np.linalg.norm(one.own_m, axis=1).max() <= FARTHEST_M
+    if most < one.read:
+        assert most / 4 < len(one) <= most
+        halves = np.histogram(one.t_ns, 4, (session.laser["t_ns"].min(), session.laser["t_ns"].max()))[0]
+        everything = np.histogram(session.laser["t_ns"], 4)[0]
+        np.testing.assert_allclose(halves / halves.sum(), everything / everything.sum(), atol=0.03)
+
+
+def test_points_are_where_the_ins_puts_them(session: SimulatedSession) -> None:
+    found = kept(session, 2)
+    mount = mount_of(parse(SessionConfig, session.session, "session").laser.mount)
+    lever_arm_m = float(np.linalg.norm(mount.lever_arm_body_m))
+    away = np.linalg.norm(found.level_m - found.context.trajectory.poses_at(found.t_ns)[0], axis=1)
+    np.testing.assert_allclose(away, np.linalg.norm(found.own_m, axis=1), atol=lever_arm_m)
+
+
+def test_scattered_numbers_are_even_and_their_own() -> None:
+    numbers = scattered(np.arange(100_000) * 8333)
+    assert len(np.unique(numbers)) == 100_000
+    np.testing.assert_allclose(np.histogram(numbers.astype(float), 10, (0, 2.0**64))[0], 10_000, rtol=0.04)
+
+
+def test_another_clock_is_one_line(session: SimulatedSession) -> None:
+    with pytest.raises(RawDataError, match=r"none of .* points lies within 50 m of the boat while the INS recorded"):
+        kept(session, 1, shift_ns=3_600_000_000_000)
