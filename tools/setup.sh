@@ -84,14 +84,19 @@ if [ -d .venv ] && ! { [ -x .venv/bin/python ] && new_enough .venv/bin/python &&
 fi
 [ -x .venv/bin/python ] || "$python" -m venv .venv || { rm -rf .venv; fail "$python could not make .venv"; }
 echo "setup: installing packages into .venv (some minutes the first time)"
-pip() { .venv/bin/python -m pip --disable-pip-version-check "$@" </dev/null; }
-pip install -q -c constraints.txt setuptools && pip install -q -c constraints.txt --no-build-isolation -e ".${EXTRAS:+[$EXTRAS]}" ||
+# Python compiles a module when it is first imported: most of the packages' modules never are. Those of a run are
+# imported below, for users of a .venv that they may not write.
+install() { .venv/bin/python -m pip --disable-pip-version-check install -q --no-compile -c constraints.txt "$@" </dev/null; }
+install setuptools && install --no-build-isolation -e ".${EXTRAS:+[$EXTRAS]}" ||
     fail "packages could not be installed (see above); correct this and run make setup again"
 loops='import sys, stages.adjust, stages.cli
 from pipeline.maths.kernels.compiled import compile_all
 compile_all(int(sys.argv[1]), 2)'
 .venv/bin/python -c "$loops" 0 & half=$! # the other processor compiles the other half
-{ .venv/bin/python -c "import open3d, pyarrow, rerun; $loops" 1 && wait "$half"; } ||
+run='import jinja2, matplotlib.figure, open3d, pyarrow, rerun, stages
+stages.load()'
+{ .venv/bin/python -c "$run
+$loops" 1 && wait "$half"; } ||
     fail "the packages do not load, or the loops of pipeline/maths/kernels do not compile (see above)"
 echo "$wanted" >"$stamp"
 echo "setup: ready; the command is .venv/bin/poolcal"
