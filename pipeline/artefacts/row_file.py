@@ -22,16 +22,20 @@ class RowFile:
     def __init__(self, columns: int) -> None:
         self._columns = columns
         try:
-            self._file = tempfile.TemporaryFile(prefix="poolcal-")  # noqa: SIM115 (open as long as the object)
+            self._file = tempfile.TemporaryFile(buffering=0, prefix="poolcal-")  # noqa: SIM115 (open as long as the object)
         except OSError as error:
             raise _no_room(error) from error
         weakref.finalize(self, self._file.close)
 
     def append(self, rows: Array) -> None:
-        """Write rows (m, columns) after those that are there."""
+        """Write rows (m, columns) after those that are there.
+
+        Nothing waits in a buffer: it would be written again, and fail again, when the file is closed.
+        """
+        left = np.ascontiguousarray(rows, dtype=np.float64).reshape(-1).view(np.uint8)
         try:
-            self._file.write(np.ascontiguousarray(rows, dtype=np.float64).data)
-            self._file.flush()  # what is read is mapped from the file
+            while len(left):
+                left = left[self._file.write(left.data) :]
         except OSError as error:
             raise _no_room(error) from error
 

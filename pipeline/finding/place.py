@@ -12,11 +12,12 @@ from pipeline.finding.dry_planes import DryPlane
 from pipeline.maths.geometry.geodesy import PoolFrame, geodetic_from_ecef
 from pipeline.maths.surfaces.flatness import plane_axes
 from pipeline.maths.surfaces.outline import clipped, convex_hull
+from pipeline.maths.target.face import plane_of
+from pipeline.maths.target.outlines import AWAY
 
 Array = NDArray[np.float64]
 UPRIGHT_DEG = 20.0  # a wall may lean by this; what leans more is a slope
 FOOT_M = 0.5  # height of the strip at the lower end of a face's dry part, by whose width it goes on below the water
-AWAY = 0.1  # largest x of a face's normal: passes lie at x < 0, and a face must look there
 DIGITS, ANGLE_DIGITS = 3, 9  # decimals of metres, and of latitude and longitude
 
 
@@ -85,12 +86,14 @@ def found_place(planes: Sequence[DryPlane], level_m: float, frame: PoolFrame, de
     water = target.points_from_ecef(frame.points_to_ecef(middle[None]))[0, 2]
     judged, faces = [], []
     for plane in planes:
-        corners = target.points_from_ecef(frame.points_to_ecef(plane.corners_m(_continued(plane, level_m, depth_m))))
-        if not plane.refused and _normal(corners)[0] > AWAY:
-            plane = replace(plane, refused="looks away from the passes beside the largest wall")
-        judged.append(plane)
         if not plane.refused:
-            faces.append((plane, np.round(corners, DIGITS)))
+            outline = plane.corners_m(_continued(plane, level_m, depth_m))
+            corners = target.points_from_ecef(frame.points_to_ecef(outline))
+            if plane_of(corners)[0][0] > AWAY:
+                plane = replace(plane, refused="looks away from the passes beside the largest wall")
+            else:
+                faces.append((plane, np.round(corners, DIGITS)))
+        judged.append(plane)
     return FoundPlace(
         latitude_deg=latitude_deg,
         longitude_deg=longitude_deg,
@@ -115,14 +118,7 @@ def _at_height(plane: DryPlane, level_m: float) -> Array:
 
 def _continued(plane: DryPlane, level_m: float, depth_m: float) -> Array:
     """Return the outline (k, 2) of a face with its part below the water: a hypothesis, which the soundings test."""
-    if len(plane.outline_m) < 3:
-        return np.zeros((3, 2))
     return convex_hull(np.concatenate([plane.outline_m, _at_height(plane, level_m - depth_m)]))
-
-
-def _normal(corners_m: Array) -> Array:
-    normal = np.cross(corners_m - corners_m[0], np.roll(corners_m, -1, axis=0) - corners_m[0]).sum(axis=0)
-    return np.asarray(normal / max(float(np.linalg.norm(normal)), 1e-300))
 
 
 def _named(faces: Sequence[tuple[DryPlane, Array]]) -> tuple[FoundFace, ...]:

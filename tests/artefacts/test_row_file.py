@@ -56,10 +56,17 @@ def test_the_file_has_no_name_and_is_closed_when_nothing_refers_to_it(
     assert not set(os.listdir("/proc/self/fd")) - before
 
 
-def test_a_full_disk_is_one_line_that_names_the_folder(small_disk: int) -> None:
+@pytest.mark.parametrize("rows", [100, 4096])
+def test_a_full_disk_is_one_line_that_names_the_folder(
+    small_disk: int, rows: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Nothing more is said when the file is closed."""
+    assert rows * COLUMNS * 8 > small_disk
     file = RowFile(COLUMNS)
     with pytest.raises(ArtefactError, match=r"a temporary file cannot be written \(File too large\); .*TMPDIR="):
-        file.append(np.ones((small_disk, COLUMNS)))
+        file.append(np.ones((rows, COLUMNS)))
+    del file
+    assert capsys.readouterr().err == ""
 
 
 def test_a_folder_that_is_not_there_is_one_line(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -1,28 +1,14 @@
 """poolcal target: from a session without a design to a calibration on what the laser saw, and what is refused."""
 
 from pathlib import Path
-from typing import Any
 
 import pytest
 import yaml
 
 from pipeline.config.load import load_pool
+from tests.support.docks import DOCK
 from tests.support.places import poolcal, simulate
 from tests.support.refusals import one_line
-
-DOCK: dict[str, Any] = {
-    "target": {
-        "kind": "faces",
-        "origin": {"latitude_deg": 36.0, "longitude_deg": 120.1, "height_m": 12.0},
-        "azimuth_deg": 20.0,
-        "faces": {
-            "wall": {"corners": [[0, 3, -4], [0, -3, -4], [0, -3, 2], [0, 3, 2]]},
-            "south": {"corners": [[0, -3, -4], [2, -5, -4], [2, -5, 2], [0, -3, 2]]},
-            "north": {"corners": [[2, 5, -4], [0, 3, -4], [0, 3, 2], [2, 5, 2]]},
-        },
-    },
-    "surroundings": {"back_wall": False},
-}
 
 
 @pytest.fixture(scope="module")

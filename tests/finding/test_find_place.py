@@ -19,26 +19,14 @@ from pipeline.maths.geometry.geodesy import PoolFrame
 from pipeline.maths.target.model import TargetModel
 from pipeline.simulation.session import SimulatedSession
 from pipeline.target.design import target_of
+from tests.support.docks import DOCK
 from tests.support.simulated import made
 
-DOCK: dict[str, Any] = {  # a quay wall with two returns and a slipway beside it, which dips under the water
-    "target": {
-        "kind": "faces",
-        "origin": {"latitude_deg": 36.0, "longitude_deg": 120.1, "height_m": 12.0},
-        "azimuth_deg": 20.0,
-        "faces": {
-            "wall": {"corners": [[0, 3, -4], [0, -3, -4], [0, -3, 2], [0, 3, 2]]},
-            "south": {"corners": [[0, -3, -4], [2, -5, -4], [2, -5, 2], [0, -3, 2]]},
-            "north": {"corners": [[2, 5, -4], [0, 3, -4], [0, 3, 2], [2, 5, 2]]},
-        },
-    },
-    "surroundings": {"back_wall": False},
-    "track": {"distances_m": [4.0, 7.0], "half_length_m": 6.0},
-}
+TRACK: dict[str, Any] = {"track": {"distances_m": [4.0, 7.0], "half_length_m": 6.0}}
 
 
 def turned(azimuth_deg: float, water_level_m: float = 0.0) -> dict[str, Any]:
-    return DOCK | {"target": DOCK["target"] | {"azimuth_deg": azimuth_deg, "water_level_m": water_level_m}}
+    return DOCK | TRACK | {"target": DOCK["target"] | {"azimuth_deg": azimuth_deg, "water_level_m": water_level_m}}
 
 
 def found(session: SimulatedSession, depth_m: float = 4.0) -> FoundPlace:

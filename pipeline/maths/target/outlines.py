@@ -20,6 +20,7 @@ Kind = Literal["same_plane", "distance", "height", "parallel"]
 FLAT_M = 0.01  # corners farther than this off their own plane make no plane
 SAME_PLANE_M = 0.02  # faces of one plane may stand this far apart by their corners
 PARALLEL_DEG = 0.5  # parallel faces may be turned by this by their corners
+AWAY = 0.1  # largest x of an upright face's normal: the boat passes at x < 0
 SMALLEST_M = 0.05  # a face smaller than the square of this side is refused
 
 
@@ -130,7 +131,7 @@ def _plane(outline: Outline) -> tuple[Array, float]:
     turns = np.cross(after - vertices, np.roll(after, -1, axis=0) - after) @ normal
     if np.any(turns <= 0):
         raise ConfigError(f"{where}: make no convex polygon; split the face into convex ones, tied by same_plane")
-    if abs(normal[2]) <= HORIZONTAL_COSINE and normal[0] > 0.1:
+    if abs(normal[2]) <= HORIZONTAL_COSINE and normal[0] > AWAY:
         raise ConfigError(
             f"{where}: the face looks away from the boat, which passes at x < 0; give its corners counter-clockwise as "
             "seen from the boat"
