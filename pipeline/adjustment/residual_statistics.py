@@ -44,6 +44,7 @@ WIDTHS = {"angle": 2.0, "step": 1.0, "distance": 1.0, "height": 0.1, "time": 10.
 CYCLES = {"ping_2": 2, "ping_3": 3, "ping_4": 4}  # a sonar may change its mode from ping to ping
 COMPARED: dict[str, Comparison] = {"pass": "rest", **dict.fromkeys(CYCLES, "rest"), "step": "steps", "height": "steps"}
 TURNS = {"turn_x": 3, "turn_y": 4, "turn_z": 5}  # components of the drift
+MERGED = 16  # number of batches whose sums are merged: more would only wait in memory
 KNOWN = 1e9  # degrees of freedom of a sigma that is not estimated
 Row = dict[str, Any]
 PassMeans = Mapping[tuple[str, int, int], BinMean]  # key: sensor, surface, pass
@@ -139,7 +140,10 @@ def _kept(
     for by_variable, by_face, sample in read:
         samples.append(sample)
         for variable, sums in by_variable.items():
-            pieces.setdefault(variable, []).append(sums)
+            parts = pieces.setdefault(variable, [])
+            parts.append(sums)
+            if len(parts) == MERGED:
+                parts[:] = [merged_residual_sums(parts)]
         yield by_face
 
 

@@ -73,9 +73,26 @@ class StoredSums:
         """Return the intervals with one more change, which is made whenever they are read."""
         return replace(self, changes=(*self.changes, change))
 
+    def shifted(self, change: Array) -> "StoredSums":
+        """Return the intervals after v has changed by q · ``change`` (g, F). Of several changes the sum is kept."""
+        *before, last = self.changes or (None,)
+        if isinstance(last, _Shift):
+            return replace(self, changes=(*before, _Shift(last.change + change)))
+        return replace(self, changes=(*self.changes, _Shift(change)))
+
     def stored(self, change: Callable[[IntervalSums], IntervalSums]) -> "StoredSums":
         """Return the intervals after a change of each alone, which is made at once."""
         return StoredSums.of(map(change, blocks(self)), self.features)
+
+
+@dataclass(frozen=True)
+class _Shift:
+    """Change of v by q · ``change`` (g, F)."""
+
+    change: Array
+
+    def __call__(self, sums: IntervalSums, numbers: Integers) -> IntervalSums:
+        return sums.shifted(self.change[numbers])
 
 
 def _shapes(features: int) -> dict[str, tuple[int, ...]]:

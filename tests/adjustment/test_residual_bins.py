@@ -1,4 +1,4 @@
-"""The bins of residuals: noise must not choose them."""
+"""The bins of residuals: noise must not choose them, and their sums are those of all batches."""
 
 from types import SimpleNamespace
 
@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pipeline.adjustment.residual_statistics import _variables
+from pipeline.adjustment.residual_statistics import MERGED, _kept, _variables
+from pipeline.maths.adjustment.residual_means import BinnedResiduals, merged_residual_sums, residual_sums
 
 WALL_M, SLANT = 4.02, np.radians(40.0)  # distance of the surface along the rays, and their incidence
 WATER_M, LEVER_ARM = 0.4, np.array([0.3, 0.2, -0.5])
@@ -59,3 +60,24 @@ def test_a_point_has_the_height_at_which_its_ray_meets_the_surface(
     start = at - 5.0 * ray
     found = variables("laser", start + (5.0 + noise_m)[:, None] * ray, normal @ ray, noise_m, start, calibrated)
     np.testing.assert_allclose(found["height"], -1.5, atol=1e-12)
+
+
+@pytest.mark.parametrize("batches", [1, MERGED - 1, MERGED, MERGED + 1, 3 * MERGED])
+def test_sums_that_are_merged_on_the_way_are_those_of_all_batches(batches: int) -> None:
+    """Whole numbers, so that no sum is rounded."""
+    rng = np.random.default_rng(batches)
+
+    def one():
+        first, second, slot, weight, v_m = rng.integers(0, 4, size=(5, 30))
+        return residual_sums(BinnedResiduals(first, second, slot, weight + 1.0, v_m - 2.0, v_m * 1.0))
+
+    by_variable = [{"pass": one(), "face": one()} for _ in range(batches)]
+    pieces, samples = {}, []
+    kept = list(_kept(((sums, number, -number) for number, sums in enumerate(by_variable)), pieces, samples))
+    assert (kept, samples) == (list(range(batches)), [-number for number in range(batches)])
+    for variable, parts in pieces.items():
+        assert len(parts) < MERGED
+        found = merged_residual_sums(parts)
+        expected = merged_residual_sums([sums[variable] for sums in by_variable])
+        for name in ("key", "sums", "largest"):
+            np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))

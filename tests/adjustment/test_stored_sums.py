@@ -81,12 +81,23 @@ def test_each_change_is_that_of_all_and_they_follow_one_another(
     assert len(whole) % 7
     found = stored(many)
     divided = found.changed(lambda block, _: rescaled(block, divisors))
-    moved = divided.changed(lambda block, numbers: block.shifted(shift[numbers]))
+    moved = divided.shifted(shift)
     expected = rescaled(whole, divisors).shifted(shift)
     backwards = np.arange(len(whole))[::-1]
     same(moved.selected(backwards), expected.selected(backwards))
     same(moved.stored(lambda block: rescaled(block, divisors)).selected(slice(None)), rescaled(expected, divisors))
     same(found.selected(slice(None)), whole)  # as before
+
+
+def test_of_shifts_one_after_another_one_is_kept(many: list[IntervalSums]) -> None:
+    whole, divisors = merged(many), np.array([2.0, 0.5, 1.0])
+    first, second, third = np.random.default_rng(0).normal(size=(3, len(whole), FEATURES))
+    found = stored(many).shifted(first).changed(lambda block, _: rescaled(block, divisors))
+    found = found.shifted(second).shifted(third)
+    expected = rescaled(whole.shifted(first), divisors).shifted(second).shifted(third)
+    for name in IntervalSums.__dataclass_fields__:
+        np.testing.assert_allclose(getattr(found.selected(slice(None)), name), getattr(expected, name), rtol=1e-9)
+    assert len(found.changes) == 3
 
 
 def test_the_scatter_and_the_edge_shares_do_not_depend_on_the_blocks(

@@ -65,6 +65,10 @@ class Intervals(Protocol):
         """
         ...
 
+    def shifted(self, change: Array) -> "Intervals":
+        """Return the intervals after v has changed by q · ``change`` (g, F)."""
+        ...
+
     def stored(self, change: Callable[["IntervalSums"], "IntervalSums"]) -> "Intervals":
         """Return the intervals after a change of each alone, which is made at once; ``change`` gets some of them."""
         ...

@@ -22,7 +22,6 @@ Order: points -> sums by interval (:mod:`~pipeline.maths.adjustment.interval_sum
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -38,7 +37,7 @@ from pipeline.maths.adjustment.eliminate_white_noise import (
     TimeAxis,
     eliminate_white_noise,
 )
-from pipeline.maths.adjustment.interval_sums import BLOCK, Intervals, IntervalSums
+from pipeline.maths.adjustment.interval_sums import BLOCK, Intervals
 from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.pose_errors import (
     DriftEstimate,
@@ -185,12 +184,7 @@ def updated_sums(linearisation: Linearisation, step: Array, drift_step: DriftEst
             times = linearisation.body.times(intervals.sums.record, intervals.sums.share)
             change[:, : len(intervals.pose)] += drift_step.at(times) @ intervals.pose.T
             changes[source.sensor][source.rows[block]] = change
-    shifts = {sensor: partial(_shifted, change=change) for sensor, change in changes.items()}
-    return {sensor: sums.changed(shifts[sensor]) for sensor, sums in linearisation.sums.items()}
-
-
-def _shifted(sums: IntervalSums, numbers: Integers, change: Array) -> IntervalSums:
-    return sums.shifted(change[numbers])
+    return {sensor: sums.shifted(changes[sensor]) for sensor, sums in linearisation.sums.items()}
 
 
 def mount_step(linearisation: Linearisation) -> Array:
