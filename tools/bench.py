@@ -79,15 +79,15 @@ import scipy.optimize, scipy.special
 STAGED = """
 import resource, sys, time
 from pathlib import Path
+from stages.commands.entry import prepare_process
+prepare_process()
 from pipeline.run import runner
 from pipeline.run.workers import workers
 from stages import load
-from stages.commands.entry import prepare_process
 def now():
     usages = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return time.perf_counter(), sum(u.ru_utime + u.ru_stime for u in usages), usages[0].ru_maxrss / 1024
 session, run, jobs = Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3])
-prepare_process()
 modules = load()
 with workers(jobs, None) as pool:
     last = now()

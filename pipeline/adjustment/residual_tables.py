@@ -132,7 +132,8 @@ def residual_sample(model: ObservationModel, sensor: str, observed: SummedBatch,
     columns |= {"range_m": ranges, "angle_deg": np.degrees(angle)}
     columns |= {"residual_m": v_m + mean_m, "coarse_residual_m": coarse_residual, "weight": robust}
     single = {name: column.astype(np.float32) for name, column in columns.items()}
-    sensors = np.full(len(v_m), sensor, dtype=object)
+    sensors = np.empty(len(v_m), dtype=object)
+    sensors.fill(sensor)  # one text for all; np.full makes one for each
     return {"sensor": sensors} | {name: points[name] for name in ("t_ns", "pass", "face")} | single
 
 

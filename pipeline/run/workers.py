@@ -39,7 +39,10 @@ class NoWorkers(ConfigError):
 
 @dataclass(frozen=True)
 class Workers:
-    """An ordered map over an executor. ``jobs`` items are processed at once; the same number waits in the queue."""
+    """An ordered map over an executor. ``jobs`` items are processed at once.
+
+    On this machine one more waits in the queue: results wait in memory. On a cluster the same number waits.
+    """
 
     jobs: int
     executor: Executor | None = None  # None: this thread
@@ -67,7 +70,7 @@ class Workers:
         call = _marked if self.local else _plain
         waiting: deque[Future[T]] = deque()
         try:
-            for arguments in itertools.islice(work, 2 * self.jobs):
+            for arguments in itertools.islice(work, self.jobs + 1 if self.local else 2 * self.jobs):
                 waiting.append(executor.submit(call, function, arguments))
             while waiting:
                 self._wait(waiting[0])
