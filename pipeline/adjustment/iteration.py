@@ -130,10 +130,10 @@ class MountAdjustment:
         return Scatter(self.equations.squares - within[0], self.redundancy - within[1])
 
 
-def estimated_columns(state: State, additional: Sequence[str] = ()) -> list[int]:
+def estimated_columns(state: State, additional: Sequence[str] = (), mount: bool = True) -> list[int]:
     """Return the numbers of the parameters to estimate: mount, surfaces, and the ones named in ``additional``."""
     surfaces = range(state.surface_slice.start, state.surface_slice.stop)
-    return sorted({*range(N_MOUNT), *surfaces, *(state.names.index(name) for name in additional)})
+    return sorted({*range(N_MOUNT * mount), *surfaces, *(state.names.index(name) for name in additional)})
 
 
 def adjust_mount(
@@ -215,12 +215,13 @@ def weighted_iteration(
 ) -> WeightedIteration:
     """Read all points, solve and step, until the weights do not change, or a direction is open.
 
-    Parameters: as for :func:`adjust_mount`.
+    Without points of the calibrated sensor, surfaces and drift alone are estimated. Parameters: as for
+    :func:`adjust_mount`.
     """
     model, prior = problem.model, problem.prior
     state = initial_mount(streams["mbes"], model) if "mbes" in streams else model.coarse
     values = CurrentValues(state, weighting=Weighting(white=prior.noise.white))
-    estimated = np.array(estimated_columns(state, settings.free))
+    estimated = np.array(estimated_columns(state, settings.free, mount=state.calibrated in streams))
     iteration = 0
     while True:
         iteration += 1

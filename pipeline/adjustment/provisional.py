@@ -30,6 +30,7 @@ SAMPLE = {"laser_pool": 60_000, "soundings_pool": 20_000}  # about this many of 
 LEAST_KEPT = 0.8  # of the labelled points of each sensor, by an adjusted mount that is better
 BEYOND_M = 0.5  # a point farther outside the target's bounds is not near it
 BUILT_RAD, BUILT_M = float(np.radians(0.02)), 0.002  # sigmas of a family's direction and place against the design
+FOUND_RAD, FOUND_M = float(np.radians(0.3)), 0.03  # against planes that were found in laser points: of the INS's drift
 SENSOR = {"laser_labelled": "laser", "soundings_labelled": "mbes"}  # by the name of the labelled stream
 
 
@@ -40,7 +41,8 @@ def design_without_place(target: TargetModel) -> DesignPrior:
     the other: 2 mm, which move one label in a hundred.
     """
     open_place = np.full(N_DISPLACEMENT, np.inf)
-    return DesignPrior(designed_planes(target), BUILT_RAD, BUILT_M, np.zeros(N_DISPLACEMENT), open_place)
+    sigmas = (FOUND_RAD, FOUND_M) if target.found else (BUILT_RAD, BUILT_M)
+    return DesignPrior(designed_planes(target), *sigmas, np.zeros(N_DISPLACEMENT), open_place)
 
 
 def sample_near_target(stream: Stream, name: str, count: float, context: LabellingContext) -> Batch:

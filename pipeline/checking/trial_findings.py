@@ -60,7 +60,7 @@ def pose_findings(
     points = (points[np.isfinite(points[:, 0])] - origin) @ R.T
     if not len(points):
         return
-    models = [model] if model.symmetric else [model, model.mirrored()]
+    models = [model, *model.mirror_images]
     side = SideOfWater("laser", model.water_level_m)
     agreed = np.array(
         [profile(points, ClosestSurface(shape), SHIFTS_M, side, REACH_M) for shape in models]

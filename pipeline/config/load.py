@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.config.fill_in import refuse_unfilled
+from pipeline.config.found import Find, with_found
 from pipeline.config.instruments import dotted_keys, merge_presets
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import SessionConfig
@@ -23,14 +24,15 @@ def load_pool(path: Path) -> PoolConfig:
     return pool_in(YamlFile.read(path))
 
 
-def pool_in(file: YamlFile) -> PoolConfig:
-    """Return the config in a pool's file, checked."""
+def pool_in(file: YamlFile, find: Find | None = None) -> PoolConfig:
+    """Return the config in a pool's file, checked; ``find``: as for :func:`with_found`."""
     if "target" not in file.content and {"ins", "laser"} & file.content.keys():
         raise ConfigError(
             f"{file.path}: is a session's file; --config wants the pool's, which says where the target is"
         )
     refuse_unfilled([file])
-    return parse(PoolConfig, with_mesh(file.content, file.path), str(file.path))
+    content = with_found(with_mesh(file.content, file.path), file.path, find)
+    return parse(PoolConfig, content, str(file.path))
 
 
 def session_yaml(folder: Path) -> Path:

@@ -116,6 +116,7 @@ class Faces(Model):
     faces: Annotated[dict[FaceName, FaceSettings], Field(min_length=1, max_length=500)]
     relations: tuple[RelationSettings, ...] = ()
     repeats_m: Length | None = None  # the height after which the shape repeats; null: it does not
+    found: bool = False  # by poolcal target, in laser points of the place itself: left and right are not in question
     origin: Origin
     azimuth_deg: Angle | None = None
     water_level_m: Lever = 0.0

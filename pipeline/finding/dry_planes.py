@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 from pipeline.errors import RawDataError
 from pipeline.maths.surfaces.flatness import Flatness, flatness, plane_axes
 from pipeline.maths.surfaces.growing import GrowthLimits, Plane, grown_regions, plane_of_voxels
-from pipeline.maths.surfaces.outline import convex_hull, shrunk, simplified
+from pipeline.maths.surfaces.outline import convex_hull, inside, shrunk, simplified
 from pipeline.maths.surfaces.voxels import voxels_of
 
 Array = NDArray[np.float64]
 VOXEL_M, CELL_M = 0.3, 0.25
+FEWEST, FEWEST_CELLS, REFITS = 4, 8, 5  # points of a cell, cells of a plane, fits of a plane to its cells
 GROWTH = GrowthLimits(thickness_m=0.03, distance_m=0.06, least_voxels=12)
 OFF_M = 0.15  # points of a plane's voxels farther off belong to something in front of it
 MARGIN_M, CORNERS = 0.1, 8  # of the outline: inside the outermost points; most corners
@@ -69,19 +70,38 @@ def dry_planes(points_m: Array, boat_m: Array) -> list[DryPlane]:
     return sorted(found, key=lambda plane: -plane.flat.width_m * plane.flat.height_m)
 
 
-def _plane(points_m: Array, plane: Plane, boat_m: Array) -> DryPlane:
-    sense = 1.0 if plane.normal @ boat_m > plane.distance_m else -1.0
-    normal, distance_m = sense * plane.normal, sense * plane.distance_m
+def _plane(points_m: Array, grown: Plane, boat_m: Array) -> DryPlane:
+    """Return the plane of a region's points, toward the boat.
+
+    A grown region goes round its corners: by 6 cm into the next wall, which turns the plane of 3 m by 0.4°. So the
+    plane is fitted again, to the means of the cells that lie on it, until it stays.
+    """
+    normal, distance_m = grown.normal, grown.distance_m
+    for _ in range(REFITS):
+        cells_m, outline = _cells_on(points_m, normal, distance_m)
+        used = cells_m[inside(outline, cells_m @ plane_axes(normal).T)]
+        if len(outline) < 3 or len(used) < FEWEST_CELLS:
+            break
+        mean = used.mean(axis=0)
+        normal = np.linalg.svd(used - mean, full_matrices=False)[2][2]
+        normal = normal if normal @ boat_m > normal @ mean else -normal
+        distance_m = float(normal @ mean)
+    sense = 1.0 if normal @ boat_m > distance_m else -1.0
+    normal, distance_m = sense * normal, sense * distance_m
+    cells_m, outline = _cells_on(points_m, normal, distance_m)
     away = points_m @ normal - distance_m
     on = np.abs(away) <= OFF_M
-    in_plane, heights = points_m[on] @ plane_axes(normal).T, points_m[on, 2]
-    flat = flatness(in_plane, away[on], CELL_M)
-    outline = simplified(shrunk(convex_hull(_cell_means(in_plane)), MARGIN_M), CORNERS)
+    in_plane, heights, away = points_m[on] @ plane_axes(normal).T, points_m[on, 2], away[on]
+    within = inside(outline, in_plane)
+    flat = flatness(in_plane[within], away[within], CELL_M)
+    if len(cells_m):  # the extent is that of all cells, the rest is judged within the outline
+        width, height = (np.ptp(cells_m @ plane_axes(normal).T, axis=0) + CELL_M).tolist()
+        flat = replace(flat, width_m=width, height_m=height)
     made = DryPlane(
         normal=normal,
         distance_m=distance_m,
-        rms_m=plane.rms_m,
-        points=int(on.sum()),
+        rms_m=float(np.sqrt(np.mean(away[within] ** 2))) if within.any() else 0.0,
+        points=int(within.sum()),
         flat=flat,
         outline_m=outline,
         lowest_m=float(np.quantile(heights, 0.01)) if len(heights) else np.inf,
@@ -90,13 +110,19 @@ def _plane(points_m: Array, plane: Plane, boat_m: Array) -> DryPlane:
     return replace(made, refused=_refusal(made))
 
 
-def _cell_means(in_plane_m: Array) -> Array:
-    """Return the means (c, 2) of the points in each cell: single points far out make no outline."""
-    cells, inverse, count = np.unique(
-        np.floor(in_plane_m / CELL_M).astype(np.int64), axis=0, return_inverse=True, return_counts=True
-    )
-    sums = np.array([np.bincount(inverse.reshape(-1), weights=axis, minlength=len(cells)) for axis in in_plane_m.T])
-    return np.asarray((sums / count).T[count >= 4])
+def _cells_on(points_m: Array, normal: Array, distance_m: float) -> tuple[Array, Array]:
+    """Return the means (c, 3) of the points in each cell of a plane that lie on it, and their outline (k, 2).
+
+    Single points far out make no cell.
+    """
+    away = points_m @ normal - distance_m
+    points, axes = points_m[np.abs(away) <= OFF_M], plane_axes(normal)
+    cells = np.floor(points @ axes.T / CELL_M).astype(np.int64)
+    inverse, count = np.unique(cells, axis=0, return_inverse=True, return_counts=True)[1:]
+    sums = np.array([np.bincount(inverse.reshape(-1), weights=axis, minlength=len(count)) for axis in points.T])
+    means = (sums / count).T[count >= FEWEST]
+    means = means[np.abs(means @ normal - distance_m) <= UNEVEN_M]
+    return means, simplified(shrunk(convex_hull(means @ axes.T), MARGIN_M), CORNERS)
 
 
 def _column_ends(along_m: Array, heights_m: Array) -> Array:

@@ -2,30 +2,64 @@
 
 from dataclasses import replace
 
-from pipeline.artefacts.streams import Stream
-from pipeline.config.stage_settings import LaserPlacement
+import numpy as np
+import pandas as pd
+
+from pipeline.adjustment.ins_drift import drift_model, pose_noise
+from pipeline.artefacts.catalogue.points import INS_SIGMAS
+from pipeline.artefacts.streams import Batch, Stream
+from pipeline.config.session import SessionConfig
+from pipeline.config.stage_settings import InsErrors, LaserPlacement, LaserPoints, narrow
 from pipeline.finding.dry_planes import dry_planes, reaching_water, water_level_m
 from pipeline.finding.kept_points import kept_points, level_context
 from pipeline.finding.place import FoundPlace, found_place
+from pipeline.finding.without_drift import track_without_drift
+from pipeline.maths.adjustment.pose_errors import PoseNoise
+from pipeline.mount import mount_of
+from pipeline.readers.file_summaries import thin_sigmas
 from pipeline.readers.track_tables import trajectory_table
 
 
-def find_place(ins: Stream, laser: Stream, placement: LaserPlacement, depth_m: float) -> FoundPlace:
+def find_place(ins: Stream, laser: Stream, session: SessionConfig, depth_m: float) -> FoundPlace:
     """Return the target that a session's laser points show.
 
     Parameters
     ----------
     ins, laser : Stream
         Records of the INS, and points of the laser, as the readers give them.
-    placement : LaserPlacement
-        The laser's mount and frame.
+    session : SessionConfig
+        The session's settings.
     depth_m : float
         Depth below the water to which faces are continued.
     """
-    track, _ = trajectory_table([batch for batch in ins.batches() if len(batch)])
-    context = level_context(track)
-    points = kept_points(laser, context, placement)
-    planes = dry_planes(points.level_m, context.trajectory.positions_m.mean(axis=0))
+    records, sigmas = _read(ins)
+    context, mount = level_context(records), mount_of(session.laser.mount)
+    points = kept_points(laser, context, narrow(LaserPlacement, session.laser))
+    boat_m = context.trajectory.positions_m.mean(axis=0)
+    serving = [plane for plane in dry_planes(points.level_m, boat_m) if not plane.refused]
+    noise = _pose_noise(session, sigmas, records["t_ns"].to_numpy())
+    trajectory = track_without_drift(points, serving, mount, narrow(LaserPoints, session.laser), noise)
+    planes = dry_planes(points.along(trajectory, mount).level_m, boat_m)
     level_m = water_level_m(planes)
     place = found_place(reaching_water(planes, level_m), level_m, context.frame, depth_m)
     return replace(place, read=points.read, used=len(points))
+
+
+def _read(ins: Stream) -> tuple[pd.DataFrame, list[Batch]]:
+    """Return the INS's records in order of time, and the sigmas that its files state, file by file."""
+    records: list[Batch] = []
+    sigmas: list[Batch] = []
+    for part in ins.parts:
+        for chunk in part.chunks():
+            records += [chunk.columns] if chunk.columns else []
+            sigmas += [thin_sigmas(chunk.sigmas)] if chunk.sigmas else []
+    return trajectory_table(records)[0], sigmas
+
+
+def _pose_noise(session: SessionConfig, sigmas: list[Batch], t_ns: np.ndarray) -> PoseNoise:
+    """Return the INS's errors over the whole session."""
+    names = [column.name for column in INS_SIGMAS.columns]
+    stated = {name: np.concatenate([chunk[name] for chunk in sigmas]) for name in names} if sigmas else {}
+    whole = pd.DataFrame({"start_ns": t_ns[:1], "end_ns": t_ns[-1:]})
+    drift = drift_model(narrow(InsErrors, session.ins), pd.DataFrame(stated, columns=names), whole)
+    return pose_noise(drift, session.ins.white)

@@ -6,7 +6,7 @@ session have their share, and the memory is the same for any session.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -17,6 +17,8 @@ from pipeline.config.stage_settings import LaserPlacement
 from pipeline.errors import RawDataError
 from pipeline.georeference.placement import laser_in_pool
 from pipeline.georeference.pool_context import PoolContext
+from pipeline.maths.geometry.trajectory import Trajectory
+from pipeline.mount import Mounted
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -43,6 +45,13 @@ class KeptPoints:
 
     def __len__(self) -> int:
         return len(self.t_ns)
+
+    def along(self, trajectory: Trajectory, mount: Mounted) -> "KeptPoints":
+        """Return the points as the laser saw them from another trajectory in the same frame."""
+        level_m = trajectory.points_from_sensor(
+            self.t_ns, self.own_m, mount.R_body_from_sensor, mount.lever_arm_body_m
+        )
+        return replace(self, level_m=level_m, context=replace(self.context, trajectory=trajectory))
 
 
 def level_context(ins: pd.DataFrame) -> PoolContext:

@@ -11,13 +11,14 @@ from pipeline.errors import RawDataError
 from pipeline.finding.dry_planes import DryPlane
 from pipeline.maths.geometry.geodesy import PoolFrame, geodetic_from_ecef
 from pipeline.maths.surfaces.flatness import plane_axes
-from pipeline.maths.surfaces.outline import clipped, convex_hull
+from pipeline.maths.surfaces.outline import bent, clipped, convex_hull
 from pipeline.maths.target.face import plane_of
 from pipeline.maths.target.outlines import AWAY
 
 Array = NDArray[np.float64]
 UPRIGHT_DEG = 20.0  # a wall may lean by this; what leans more is a slope
 FOOT_M = 0.5  # height of the strip at the lower end of a face's dry part, by whose width it goes on below the water
+BEND_M = 0.02  # a corner nearer to the line between its neighbours is none: rounded to mm it could bend inwards
 DIGITS, ANGLE_DIGITS = 3, 9  # decimals of metres, and of latitude and longitude
 
 
@@ -118,7 +119,7 @@ def _at_height(plane: DryPlane, level_m: float) -> Array:
 
 def _continued(plane: DryPlane, level_m: float, depth_m: float) -> Array:
     """Return the outline (k, 2) of a face with its part below the water: a hypothesis, which the soundings test."""
-    return convex_hull(np.concatenate([plane.outline_m, _at_height(plane, level_m - depth_m)]))
+    return bent(convex_hull(np.concatenate([plane.outline_m, _at_height(plane, level_m - depth_m)])), BEND_M)
 
 
 def _named(faces: Sequence[tuple[DryPlane, Array]]) -> tuple[FoundFace, ...]:

@@ -19,6 +19,7 @@ def pool_yaml(place: FoundPlace) -> str:
         "# a fender, a ladder, a moored boat. Below the water each goes on as above: the soundings test that.",
         "target:",
         "  kind: faces",
+        "  found: true",
         f"  origin: {{latitude_deg: {place.latitude_deg:.9f}, longitude_deg: {place.longitude_deg:.9f}, "
         f"height_m: {place.height_m:.3f}}}",
         f"  azimuth_deg: {place.azimuth_deg:.3f}",

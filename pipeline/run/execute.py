@@ -12,7 +12,7 @@ from pipeline.config.stage_settings import stage_config
 from pipeline.errors import ArtefactError, RawDataError
 from pipeline.run import folder, manifest, provenance
 from pipeline.run.digests import Digests
-from pipeline.run.freshness import Run, key_of, raw_digests, raw_of
+from pipeline.run.freshness import Run, key_of, raw_digests_now, raw_of
 from pipeline.run.kept_results import keep_accepted
 from pipeline.run.stage_files import make_folders, read_input, rows_to_map, write_outputs
 from pipeline.run.stage_protocol import declared, evaluate, inputs_in, name_of
@@ -63,7 +63,7 @@ def execute_stage(this: Run, stage: ModuleType) -> None:
 def _raw_has_changed(this: Run, stage: ModuleType) -> bool:
     """Return whether a raw file that the stage has read has changed since this run first hashed it."""
     sensors = [marker.sensor for marker in declared(stage.Inputs).values() if isinstance(marker, RawFiles)]
-    return any(raw_digests(this, sensor) != raw_of(this, sensor) for sensor in sensors)
+    return any(raw_digests_now(this, sensor) != raw_of(this, sensor) for sensor in sensors)
 
 
 def _remove_quietly(partial: Path) -> None:

@@ -16,6 +16,7 @@ from pipeline.run.settings import RUN_YAML
 
 LOCK = ".lock"
 DIGESTS = "digests.json"
+FOUND = "found.json"
 
 
 # --- the lock --------------------------------------------------------------------------------------------------------
@@ -27,7 +28,7 @@ def locked(run: Path, stages: Sequence[str]) -> Iterator[None]:
     """
     with writing(run):
         run.mkdir(parents=True, exist_ok=True)
-        strangers = sorted(entry.name for entry in run.iterdir() if entry.name not in (LOCK, DIGESTS))
+        strangers = sorted(entry.name for entry in run.iterdir() if entry.name not in (LOCK, DIGESTS, FOUND))
         if strangers and not (run / RUN_YAML).is_file() and strangers != [RUN_YAML + ".new"]:
             raise ArtefactError(f"{run}: holds {strangers[0]} but no {RUN_YAML}, so it is no run folder; name another")
         file = _opened(run / LOCK, os.O_RDWR | os.O_CREAT)

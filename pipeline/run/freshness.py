@@ -5,6 +5,7 @@ import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from pipeline.artefacts.schema import Artefact, Document, Provenance, RawFiles
 from pipeline.config.stage_settings import plain_settings, stage_config
@@ -87,7 +88,7 @@ def raw_of(this: Run, sensor: str) -> dict[str, str]:
     Later stages depend on these digests and the report names them, even if a file changes during the run.
     """
     if sensor not in this.raw:
-        this.raw[sensor] = raw_digests(this, sensor)
+        this.raw[sensor] = raw_digests_now(this, sensor)
     return this.raw[sensor]
 
 
@@ -96,22 +97,25 @@ def all_raw(this: Run) -> dict[str, str]:
     return {name: digest for sensor in SENSORS for name, digest in raw_of(this, sensor).items()} | cast_digest(this)
 
 
-def raw_digests(this: Run, sensor: str) -> dict[str, str]:
-    """Return the present digests of one sensor's files. Their names are paths relative to the session folder."""
-    root, settings = this.settings.session_folder, getattr(this.settings.session, sensor)
-    if settings is None:
-        return {}
+def raw_digests_now(this: Run, sensor: str) -> dict[str, str]:
+    """Return the present digests of one sensor's files by name; none if the session has not this sensor."""
+    settings = getattr(this.settings.session, sensor)
+    return {} if settings is None else raw_digests(this.digests, this.settings.session_folder, sensor, settings)
+
+
+def raw_digests(digests: Digests, root: Path, sensor: str, settings: Any) -> dict[str, str]:
+    """Return the digests of one sensor's files. Their names are paths relative to the session folder ``root``."""
     paths = dispatch.raw_files(settings, root)
     names = [path.relative_to(root).as_posix() for path in paths]
     for name in names:
         if any("\udc80" <= letter <= "\udcff" for letter in name):  # stands for a byte that is not UTF-8
             raise RawDataError(f"{name!a}: the file's name is not UTF-8; rename it")
-    digests = dict(zip(names, this.digests.of(paths), strict=True))
+    of_name = dict(zip(names, digests.of(paths), strict=True))
     first: dict[str, str] = {}
-    for name, digest in digests.items():
+    for name, digest in of_name.items():
         if first.setdefault(digest, name) != name and digest != EMPTY:
             raise RawDataError(f"{name}: is the same as {first[digest]}; list one of the two under {sensor}.files")
-    return digests
+    return of_name
 
 
 def cast_digest(this: Run) -> dict[str, str]:

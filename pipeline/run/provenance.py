@@ -57,6 +57,12 @@ def _source_digests(root: Path, name: str, own: Path, raw: bool) -> dict[str, st
 
 
 @functools.cache
+def digests_of(*modules: str) -> dict[str, str]:
+    """Return the digests of the program's files on which these modules depend."""
+    return {path.relative_to(ROOT).as_posix(): sha256(path) for path in import_closure(ROOT, modules)}
+
+
+@functools.cache
 def git_commit() -> str | None:
     """Return the commit at which this program was checked out; None without git or a repository."""
     if not (ROOT / ".git").exists():

@@ -5,6 +5,7 @@ The caller passes the stages (:mod:`stages`). This module knows only their proto
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 
@@ -14,6 +15,7 @@ from pipeline.errors import ArtefactError
 from pipeline.run import folder, manifest
 from pipeline.run.digests import Digests
 from pipeline.run.execute import execute_stage
+from pipeline.run.found_target import remembered_target
 from pipeline.run.freshness import Run, out_of_date
 from pipeline.run.other_session import refuse_other_session
 from pipeline.run.progress import Progress
@@ -67,9 +69,10 @@ def run(
     list
         The names of the stages that had to be run.
     """
-    settings = load_settings(session_folder, config_path, calibrated)
+    names, progress = [name_of(stage) for stage in stages], progress or Progress(quiet=True)
+    find = partial(remembered_target, run_folder, names, session_folder, workers=workers, progress=progress)
+    settings = load_settings(session_folder, config_path, calibrated, find)
     refuse_shared_folder(run_folder, session_folder)
-    names = [name_of(stage) for stage in stages]
     with folder.locked(run_folder, names):
         refuse_other_sensor(run_folder, calibrated)
         this = _open(run_folder, settings, names, workers, progress)

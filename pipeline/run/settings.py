@@ -1,8 +1,9 @@
 """Settings of a run. They are read from YAML, kept in run.yaml, and refused if they cannot be correct."""
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import yaml
 from pipeline.atomic_files import write_text
 from pipeline.config.about import About
 from pipeline.config.fill_in import refuse_unfilled
+from pipeline.config.found import Found
 from pipeline.config.load import pool_in, session_in, session_yaml, stated_keys
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import Calibrated, Mbes, SessionConfig
@@ -64,7 +66,12 @@ class Settings:
         return {**self.pool.model_dump(mode="json"), **self.session.model_dump(mode="json")}
 
 
-def load_settings(session_folder: Path, config_path: Path, calibrated: Calibrated | None = "mbes") -> Settings:
+def load_settings(
+    session_folder: Path,
+    config_path: Path,
+    calibrated: Calibrated | None = "mbes",
+    find: Callable[[SessionConfig, Found], Mapping[str, Any]] | None = None,
+) -> Settings:
     """Read and check both YAML files, each of them once: a file that is changed meanwhile gives no mixture.
 
     Parameters
@@ -76,17 +83,19 @@ def load_settings(session_folder: Path, config_path: Path, calibrated: Calibrate
     calibrated
         "mbes": the sonar. "laser": the laser; a sonar in the session is ignored. None: the sonar if the session has
         one, otherwise the laser.
+    find
+        Function that finds a target of the kind "found" in the session's files; None: such a target is refused.
     """
     config = YamlFile.read(config_path)
     files = {"session": YamlFile.read(session_yaml(session_folder)), "config": config}
     refuse_unfilled(files.values())
-    pool = pool_in(config)
+    session = session_in(files["session"], with_cast)
+    pool = pool_in(config, None if find is None else partial(find, session))
     try:
         target_of(pool.target)
     except ConfigError as error:
         raise ConfigError(f"{config_path}: {error}") from error
     refuse_unknown_faces(pool, config_path)
-    session = session_in(files["session"], with_cast)
     if calibrated == "laser":
         session = session.model_copy(update={"mbes": None})
     elif calibrated == "mbes" and session.calibrated == "laser":

@@ -1,5 +1,6 @@
 """The model of the target from its settings."""
 
+from dataclasses import replace
 from functools import lru_cache
 
 from pipeline.config.target import FaceSettings, Letters, RelationSettings, Target
@@ -12,7 +13,8 @@ def target_of(target: Target) -> TargetModel:
     """Return the target's model. It is cached, because it takes 0.05 s and has many users: do not change it."""
     if isinstance(target, Letters):
         return _by_letters(target)
-    return _by_faces(tuple(target.faces.items()), target.relations, target.water_level_m, target.repeats_m)
+    model = _by_faces(tuple(target.faces.items()), target.relations, target.water_level_m, target.repeats_m)
+    return replace(model, found=target.found)
 
 
 @lru_cache(maxsize=16)

@@ -83,13 +83,11 @@ def _rivals(model: TargetModel) -> Iterator[tuple[TargetModel, str, float]]:
     if period_m is not None:
         yield model, "one period higher", period_m
         yield model, "one period lower", -period_m
-    if model.symmetric:
-        return
-    mirrored = model.mirrored()
-    yield mirrored, "left and right exchanged", 0.0
-    if period_m is not None:
-        yield mirrored, "left and right exchanged, half a period higher", period_m / 2
-        yield mirrored, "left and right exchanged, half a period lower", -period_m / 2
+    for mirrored in model.mirror_images:
+        yield mirrored, "left and right exchanged", 0.0
+        if period_m is not None:
+            yield mirrored, "left and right exchanged, half a period higher", period_m / 2
+            yield mirrored, "left and right exchanged, half a period lower", -period_m / 2
 
 
 def _fitted(start: TargetFrame, scan: Scan, surface: TargetSurface) -> TargetFrame:

@@ -16,8 +16,10 @@ from pipeline.errors import PoolcalError
 from pipeline.readers.casts import with_cast
 from pipeline.report.cast_checks import describe_cast
 from pipeline.results.pages.assumptions import drift_note
+from pipeline.run.found_target import found_target
 from pipeline.run.progress import Progress
 from pipeline.run.settings import load_settings
+from pipeline.run.workers import SERIAL
 from stages.commands.answer import print_answer
 from stages.in_memory import calibrate_in_memory
 
@@ -36,7 +38,8 @@ def command(session: Path, config: Path | None, as_json: bool) -> int:
     as_json
         True: print JSON, for programs.
     """
-    settings = None if config is None else load_settings(session, config, None)
+    find = partial(found_target, session, workers=SERIAL)
+    settings = None if config is None else load_settings(session, config, None, find)
     content, pool = (load_session(session, with_cast), None) if settings is None else (settings.session, settings.pool)
     progress = Progress()
     with progress.shown("reading and comparing the files"):

@@ -1,9 +1,11 @@
 """``poolcal stage``: run one stage of a run."""
 
+from functools import partial
 from pathlib import Path
 
 from pipeline.errors import ConfigError
 from pipeline.run import runner
+from pipeline.run.found_target import remembered_target
 from pipeline.run.progress import Progress
 from pipeline.run.settings import calibrated_in, holds_run, load_settings
 from pipeline.run.workers import workers
@@ -38,11 +40,12 @@ def command(name: str, run: Path, session: Path | None, config: Path | None, opt
     if (session is None) != (config is None):
         raise ConfigError("--session and --config: give both, or neither to use those in RUN/run.yaml")
     calibrated = calibrated_in(run) if holds_run(run) else "mbes"
-    settings = None
-    if session is not None and config is not None:
-        settings = load_settings(session, config, calibrated)
+    settings, progress = None, Progress()
     with workers(options.jobs, options.executor) as pool:
-        runner.run_stage(load(calibrated), name, run, settings=settings, workers=pool, progress=Progress())
+        if session is not None and config is not None:
+            find = partial(remembered_target, run, names, session, workers=pool, progress=progress)
+            settings = load_settings(session, config, calibrated, find)
+        runner.run_stage(load(calibrated), name, run, settings=settings, workers=pool, progress=progress)
     status = print_result(run) if name == names[-1] else 0
     say_failures(draw_missing(run, options.drawings))
     return status

@@ -6,7 +6,6 @@ from pathlib import Path
 from pipeline.artefacts.streams import Stream
 from pipeline.atomic_files import write_text
 from pipeline.config.load import load_session
-from pipeline.config.stage_settings import LaserPlacement
 from pipeline.errors import ConfigError
 from pipeline.finding.find import find_place
 from pipeline.finding.found_text import table_text
@@ -39,7 +38,7 @@ def command(folder: Path, out: Path | None, depth_m: float, jobs: int | None) ->
     with workers(jobs, None) as pool:
         ins = Stream(raw_parts("ins", session.ins, folder), pool.map, pool.here)
         laser = Stream(raw_parts("laser", session.laser, folder), pool.map, pool.here)
-        place = find_place(ins, laser, LaserPlacement(mount=session.laser.mount, frame=session.laser.frame), depth_m)
+        place = find_place(ins, laser, session, depth_m)
     say(table_text(place), sys.stdout)
     if out is not None:
         write_text(out, pool_yaml(place))

@@ -44,7 +44,7 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 N_DISPLACEMENT = 6  # d and ω
 REACH_M = 2.0  # distance at which a turn of a surface counts as a shift
-UNDETERMINED = 1e-6  # a singular value below this share of the largest leaves a direction open
+UNDETERMINED = 0.03  # a smaller singular value leaves a direction open: of walls that lean by 1° or 2°, the height
 OPEN = 1e-12  # an eigenvalue of the scaled normal matrix of g below this leaves a direction open
 
 
@@ -157,7 +157,8 @@ class DesignPrior:
 def displacement(surfaces: Sequence[ObservedSurface], planes: Mapping[str, tuple[Array, Array]]) -> Array:
     """Return the displacement g (6,), m and rad, that brings the designed body onto surfaces, by least squares.
 
-    A turn of a surface counts as its shift at the distance REACH_M. A component that no surface determines is zero.
+    A turn of a surface counts as its shift at the distance REACH_M. A component that no surface determines is zero, as
+    is one that hardly any does: walls as adjusted lean by some 0.01°, and then a millimetre would be metres of height.
 
     Parameters
     ----------
@@ -171,7 +172,9 @@ def displacement(surfaces: Sequence[ObservedSurface], planes: Mapping[str, tuple
         r, _, G = _misclosures(surface, *planes[surface.family])
         rows.append(weight[:, None] * G)
         right.append(weight * r)
-    return np.asarray(np.linalg.lstsq(np.concatenate(rows), -np.concatenate(right), rcond=UNDETERMINED)[0])
+    left, sizes, directions = np.linalg.svd(np.concatenate(rows), full_matrices=False)
+    seen = sizes > UNDETERMINED
+    return np.asarray(-directions[seen].T @ (left[:, seen].T @ np.concatenate(right) / sizes[seen]))
 
 
 @dataclass(frozen=True)

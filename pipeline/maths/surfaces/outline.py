@@ -69,6 +69,23 @@ def simplified(polygon_m: Array, corners: int) -> Array:
     return np.array(found).reshape(-1, 2)
 
 
+def bent(polygon_m: Array, least_m: float) -> Array:
+    """Return the polygon without corners that are nearer than ``least_m`` to the line from one neighbour to the other.
+
+    >>> len(bent(np.array([[0.0, 0.0], [1.0, -0.001], [2.0, 0.0], [2.0, 2.0]]), 0.02))
+    3
+    """
+    found = list(polygon_m)
+    while len(found) > 3:
+        before, after = np.roll(found, 1, axis=0), np.roll(found, -1, axis=0)
+        chord = np.linalg.norm(after - before, axis=1)
+        off = [_turn(*corners) for corners in zip(before, found, after, strict=True)] / np.maximum(chord, 1e-9)
+        if off.min() >= least_m:
+            break
+        found.pop(int(np.argmin(off)))
+    return np.array(found).reshape(-1, 2)
+
+
 def inside(polygon_m: Array, points_m: Array) -> NDArray[np.bool_]:
     """Return whether points (n, 2) lie in a polygon or on its edges."""
     found = np.ones(len(points_m), dtype=bool)

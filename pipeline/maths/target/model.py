@@ -61,6 +61,8 @@ class TargetModel:
         Height of the water, target frame.
     repeats_m
         Height after which the shape repeats; None if it does not.
+    found
+        Whether the corners come from laser points of the place itself: then left and right are not in question.
     """
 
     faces: tuple[Face, ...]
@@ -68,6 +70,7 @@ class TargetModel:
     parallel: tuple[tuple[str, str], ...]
     water_level_m: float
     repeats_m: float | None
+    found: bool = False
 
     @property
     def wet_heights_m(self) -> tuple[float, float]:
@@ -122,6 +125,11 @@ class TargetModel:
     def symmetric(self) -> bool:
         """Return whether the mirrored target is the same."""
         return all(any(face.same_corners(other) for other in self.faces) for face in self.mirrored().faces)
+
+    @property
+    def mirror_images(self) -> tuple["TargetModel", ...]:
+        """Return the mirrored target, which may be the true one; none if it is the same, or if the target was found."""
+        return () if self.found or self.symmetric else (self.mirrored(),)
 
     def triangles(self) -> tuple[Array, Array]:
         """Return vertices (v, 3) and corner numbers (t, 3) of triangles; those of a face share its first corner."""

@@ -76,6 +76,19 @@ def test_the_displacement_of_surfaces_is_found_and_leaves_open_directions_alone(
     np.testing.assert_allclose(displacement(vertical, PLANES), np.r_[shift[:2], np.zeros(4)], atol=1e-9)
 
 
+def test_walls_that_hardly_lean_tell_no_height() -> None:
+    """A batter of 6° does."""
+    leaning = {}
+    for name, lean in (("a", 2e-4), ("b", -1e-4), ("d", 3e-4)):
+        n, q = PLANES[name]
+        leaning[name] = (n * np.cos(lean) + np.array([0.0, 0.0, np.sin(lean)]), q)
+    off = [ObservedSurface.at(name, n, q + 0.002 * np.array([1.0, 1.0, 0.0])) for name, (n, q) in leaning.items()]
+    np.testing.assert_allclose(displacement(off, PLANES), [0.002, 0.002, 0, 0, 0, 0], atol=5e-4)
+    batter = {name: (n * np.cos(0.1) + np.array([0.0, 0.0, np.sin(0.1)]), q) for name, (n, q) in leaning.items()}
+    higher = [ObservedSurface.at(name, n, q + np.array([0.0, 0.0, 0.05])) for name, (n, q) in batter.items()]
+    np.testing.assert_allclose(displacement(higher, batter), [0, 0, 0.05, 0, 0, 0], atol=1e-9)
+
+
 def test_a_design_displaced_as_a_whole_is_no_misclosure() -> None:
     shift, turn = np.array([0.1, -0.2, 0.05]), Rotation.from_rotvec([0.0, 0.0, 1e-4])
     surfaces = [ObservedSurface.at(name, turn.apply(n), turn.apply(q) + shift) for name, (n, q) in PLANES.items()]

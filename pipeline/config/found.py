@@ -1,0 +1,68 @@
+"""The target in a pool's config that is to be found in the session's laser points: ``target: {kind: found}``.
+
+It is found before any stage runs, and its faces are put into the settings. Therefore all other code knows faces only,
+and a run's settings hold the corners that were used.
+"""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from pipeline.config.quantities import Model
+from pipeline.config.target import FaceName
+from pipeline.config.yaml_models import parse
+from pipeline.errors import ConfigError
+
+
+class Found(Model):
+    """What is said of a target that is to be found: how deep its faces go on, and which of them are struck."""
+
+    kind: Literal["found"]
+    depth_m: Annotated[float, Field(ge=0.5, le=100)] = 4.0  # below the water
+    strike: tuple[FaceName, ...] = ()  # faces that are no wall below the water
+
+
+class _OfPool(Model):
+    target: Found
+
+
+Find = Callable[[Found], Mapping[str, Any]]  # returns the content of a pool's file, with target and as_built
+
+
+def with_found(content: dict[str, Any], path: Path, find: Find | None) -> dict[str, Any]:
+    """Return the content of a pool's file with the faces of a target that is to be found.
+
+    Parameters
+    ----------
+    content, path
+        The file's content, and its path for messages.
+    find
+        Function that finds the target; None: there are no laser points to find it in.
+
+    Raises
+    ------
+    ConfigError
+        There is nothing to find it in, or a face to be struck is not among those that were found.
+    """
+    target = content.get("target")
+    if not isinstance(target, dict) or target.get("kind") != "found":
+        return content
+    wanted = parse(_OfPool, {"target": target}, str(path)).target
+    if find is None:
+        raise ConfigError(
+            f"{path}: target.kind: found: there are no laser points here to find it in; run poolcal target on a "
+            "session that was recorded there, and give the file that its --out writes"
+        )
+    found = find(wanted)
+    faces = found["target"]["faces"]
+    for name in wanted.strike:
+        if name not in faces:
+            raise ConfigError(f"{path}: target.strike: {name!r}: no such face was found, but {', '.join(faces)}")
+    left = {name: face for name, face in faces.items() if name not in wanted.strike}
+    if not left:
+        raise ConfigError(f"{path}: target.strike: no face is left of {', '.join(faces)}; leave one, or more")
+    built = content.get("as_built")
+    as_built = found["as_built"] | built if isinstance(built, dict) else built or found["as_built"]
+    return content | {"target": {**found["target"], "faces": left}, "as_built": as_built}

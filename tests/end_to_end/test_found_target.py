@@ -1,0 +1,100 @@
+"""A config that says ``target: {kind: found}``: found once, remembered, and refused in one line where it cannot be."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from pipeline.run.folder import FOUND
+from pipeline.run.settings import RUN_YAML
+from tests.support.docks import DOCK
+from tests.support.places import Told, poolcal, simulate
+from tests.support.refusals import one_line
+
+
+@pytest.fixture(scope="module")
+def dock(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A session at a wall with two returns."""
+    folder = tmp_path_factory.mktemp("dock") / "session"
+    return simulate(folder, **DOCK, track={"half_length_m": 6.0}, laser={"point_rate_hz": 8000.0})
+
+
+def config(folder: Path, **more: Any) -> Path:
+    file = folder / "pool.yaml"
+    target = {"kind": "found"} | more
+    file.write_text(yaml.safe_dump({"target": target}), encoding="utf-8")
+    return file
+
+
+def run(dock: Path, file: Path, folder: Path, jobs: int = 1) -> Told:
+    return poolcal("run", dock, "--config", file, "--run", folder, "--jobs", jobs)
+
+
+def faces(folder: Path) -> dict[str, Any]:
+    settings: dict[str, Any] = yaml.safe_load((folder / RUN_YAML).read_text(encoding="utf-8"))["config"]
+    assert settings["as_built"]["offset_sigma_m"] == 0.02
+    return dict(settings["target"]["faces"])
+
+
+def test_it_is_found_once_and_again_when_what_it_depends_on_changes(dock: Path, tmp_path: Path) -> None:
+    folders = [tmp_path / f"run-{jobs}" for jobs in (1, 2)]
+    for jobs, folder in enumerate(folders, start=1):
+        told = run(dock, config(tmp_path), folder, jobs)
+        assert told.status in (0, 1), told.err
+        assert told.ran[-1] == "report"
+        assert "exchanged" not in told.out  # a found target has no left and right to be wrong
+        assert "could be adjusted" not in told.out  # walls tell no height, and yet labels are without the drift
+        assert sorted(faces(folder)) == ["wall-1", "wall-2", "wall-3"]
+    memories = [folder / FOUND for folder in folders]
+    assert memories[0].read_bytes() == memories[1].read_bytes()
+
+    def when() -> int:
+        return memories[0].stat().st_mtime_ns
+
+    before = when()
+    told = run(dock, config(tmp_path), folders[0])
+    assert (told.ran, when()) == ([], before)
+    told = run(dock, config(tmp_path, strike=["wall-3"]), folders[0])  # no other target was found
+    assert sorted(faces(folders[0])) == ["wall-1", "wall-2"]
+    assert when() == before
+    run(dock, config(tmp_path, depth_m=3.0), folders[0])
+    assert when() > before
+    assert min(corner[2] for corner in faces(folders[0])["wall-1"]["corners"]) == pytest.approx(-3.0, abs=0.1)
+
+
+@pytest.mark.parametrize("damaged", ["", "[1]", '{"key": "', '{"key": 1, "found": {}}'])
+def test_a_damaged_memory_is_none(dock: Path, tmp_path: Path, damaged: str) -> None:
+    folder = tmp_path / "run"
+    folder.mkdir()
+    (folder / FOUND).write_text(damaged, encoding="utf-8")
+    told = run(dock, config(tmp_path), folder)
+    assert told.status in (0, 1), told.err
+    assert set(json.loads((folder / FOUND).read_text(encoding="utf-8"))) == {"key", "found"}
+
+
+def test_what_says_nothing_true_is_refused(dock: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    unknown = config(tmp_path, strike=["wall-1", "wall-9"])
+    one_line(run(dock, unknown, folder), "target.strike", "'wall-9'", "wall-1, wall-2, wall-3")
+    everything = config(tmp_path, strike=["wall-1", "wall-2", "wall-3"])
+    one_line(run(dock, everything, folder), "target.strike", "no face is left")
+    one_line(run(dock, config(tmp_path, depth_m=-4), folder), "target.depth_m")
+    one_line(run(dock, config(tmp_path, faces={}), folder), "target.faces")
+    assert run(dock, config(tmp_path), folder).status in (0, 1)  # the folder is as good as new
+    one_line(run(dock, config(tmp_path), dock / "run"), "lies in the session folder")
+    assert not (dock / "run").exists()
+
+
+def test_before_anything_is_sailed_there_is_nothing_to_find(dock: Path, tmp_path: Path) -> None:
+    plan = tmp_path / "plan.yaml"
+    plan.write_text("passes: [{distance_m: 5}]\n", encoding="utf-8")
+    told = poolcal("plan", plan, "--session", dock, "--config", config(tmp_path))
+    one_line(told, "target.kind", "poolcal target")
+
+
+def test_a_check_finds_the_target_too(dock: Path, tmp_path: Path) -> None:
+    told = poolcal("check", dock, "--config", config(tmp_path))
+    assert told.status in (0, 1), told.err
+    assert "Target found" in told.out or "target" in told.out
