@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import RawDataError
-from pipeline.maths.surfaces.flatness import Flatness, flatness, plane_axes
+from pipeline.maths.surfaces.flatness import Flatness, cells_of, flatness, plane_axes
 from pipeline.maths.surfaces.growing import GrowthLimits, Plane, grown_regions, plane_of_voxels
 from pipeline.maths.surfaces.outline import convex_hull, inside, shrunk, simplified
 from pipeline.maths.surfaces.voxels import voxels_of
@@ -117,9 +117,8 @@ def _cells_on(points_m: Array, normal: Array, distance_m: float) -> tuple[Array,
     """
     away = points_m @ normal - distance_m
     points, axes = points_m[np.abs(away) <= OFF_M], plane_axes(normal)
-    cells = np.floor(points @ axes.T / CELL_M).astype(np.int64)
-    inverse, count = np.unique(cells, axis=0, return_inverse=True, return_counts=True)[1:]
-    sums = np.array([np.bincount(inverse.reshape(-1), weights=axis, minlength=len(count)) for axis in points.T])
+    _, inverse, count = cells_of(points @ axes.T, CELL_M)
+    sums = np.array([np.bincount(inverse, weights=axis, minlength=len(count)) for axis in points.T])
     means = (sums / count).T[count >= FEWEST]
     means = means[np.abs(means @ normal - distance_m) <= UNEVEN_M]
     return means, simplified(shrunk(convex_hull(means @ axes.T), MARGIN_M), CORNERS)

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 FEWEST = 4  # points of a cell that counts
 FEWEST_CELLS = 8  # cells for a surface of second order
 
@@ -49,6 +50,22 @@ def plane_axes(normal: Array) -> Array:
     return np.array([level, up / np.linalg.norm(up)]) + 0.0  # no negative zeros
 
 
+def cells_of(in_plane_m: Array, cell_m: float) -> tuple[Integers, Integers, Integers]:
+    """Return the cells (c, 2) of a plane that have points, ascending, the cell of each point (n,), and their counts.
+
+    Sorting one number for each point takes a tenth of the time of sorting rows of two.
+    """
+    cell = np.floor(in_plane_m / cell_m).astype(np.int64)
+    if not len(cell):
+        return cell, np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
+    low = cell.min(axis=0)
+    span = int(cell[:, 1].max() - low[1]) + 1
+    codes, inverse, count = np.unique(
+        (cell[:, 0] - low[0]) * span + cell[:, 1] - low[1], return_inverse=True, return_counts=True
+    )
+    return np.column_stack(np.divmod(codes, span)) + low, inverse.reshape(-1), count
+
+
 def flatness(in_plane_m: Array, away_m: Array, cell_m: float) -> Flatness:
     """Return how flat a plane is.
 
@@ -61,10 +78,7 @@ def flatness(in_plane_m: Array, away_m: Array, cell_m: float) -> Flatness:
     cell_m : float
         Length of the side of a cell.
     """
-    cell = np.floor(in_plane_m / cell_m).astype(np.int64)
-    keys, inverse = np.unique(cell, axis=0, return_inverse=True)
-    inverse = inverse.reshape(-1)
-    count = np.bincount(inverse, minlength=len(keys))
+    keys, inverse, count = cells_of(in_plane_m, cell_m)
     use = count >= FEWEST
     if not use.any():
         return Flatness(0.0, 0.0, 0.0, 0.0, 0.0)

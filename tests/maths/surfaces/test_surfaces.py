@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.maths.surfaces.flatness import flatness, plane_axes
+from pipeline.maths.surfaces.flatness import cells_of, flatness, plane_axes
 from pipeline.maths.surfaces.growing import GrowthLimits, distances_from, grown_regions, plane_of_voxels
 from pipeline.maths.surfaces.outline import area, clipped, convex_hull, inside, shrunk
 from pipeline.maths.surfaces.voxels import Voxels, merged_voxels, voxels_of
@@ -187,3 +187,13 @@ def test_a_square_is_cut_and_made_smaller() -> None:
     assert area(smaller) == pytest.approx(1.6**2)
     np.testing.assert_allclose(np.abs(smaller - 1.0), 0.8)
     assert len(shrunk(square, 1.1)) == 0
+
+
+@pytest.mark.parametrize("count", [0, 1, 500])
+def test_cells_are_those_of_rows(count: int) -> None:
+    places = np.random.default_rng(count).normal(scale=3.0, size=(count, 2))
+    keys, inverse, counts = cells_of(places, 0.25)
+    expected = np.unique(np.floor(places / 0.25).astype(np.int64), axis=0, return_inverse=True, return_counts=True)
+    np.testing.assert_array_equal(keys, expected[0])
+    np.testing.assert_array_equal(inverse, expected[1].reshape(-1))
+    np.testing.assert_array_equal(counts, expected[2])
