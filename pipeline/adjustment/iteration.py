@@ -133,7 +133,7 @@ class MountAdjustment:
 def estimated_columns(state: State, additional: Sequence[str] = (), mount: bool = True) -> list[int]:
     """Return the numbers of the parameters to estimate: mount, surfaces, and the ones named in ``additional``."""
     surfaces = range(state.surface_slice.start, state.surface_slice.stop)
-    return sorted({*range(N_MOUNT * mount), *surfaces, *(state.names.index(name) for name in additional)})
+    return sorted({*range(N_MOUNT if mount else 0), *surfaces, *(state.names.index(name) for name in additional)})
 
 
 def adjust_mount(

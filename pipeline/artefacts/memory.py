@@ -1,4 +1,4 @@
-"""Memory of the process, by the C library: one heap for all threads, and free memory that is given back.
+"""Memory of the process: heaps that keep little, and free memory that is given back.
 
 What a stage no longer needs lies in pieces between what stays. glibc gives back the end of its heap alone, unless it is
 asked. Other C libraries have neither call.
@@ -15,7 +15,7 @@ import sys
 ARENA_MAX = -8  # M_ARENA_MAX in malloc.h of glibc
 
 
-def use_one_heap() -> None:
+def use_small_heaps() -> None:
     """Let all threads share one heap: with a heap for each, glibc keeps more memory that is free, a seventh of all.
 
     Arrow, which must not be loaded yet, shall use jemalloc; its builds for Linux have it.

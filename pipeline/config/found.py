@@ -15,12 +15,15 @@ from pipeline.config.target import FaceName
 from pipeline.config.yaml_models import parse
 from pipeline.errors import ConfigError
 
+DEPTH_M = 4.0  # below the water, to which faces are continued unless another depth is given
+DEPTHS_M = (0.5, 100.0)  # those that may be given
+
 
 class Found(Model):
     """What is said of a target that is to be found: how deep its faces go on, and which of them are struck."""
 
     kind: Literal["found"]
-    depth_m: Annotated[float, Field(ge=0.5, le=100)] = 4.0  # below the water
+    depth_m: Annotated[float, Field(ge=DEPTHS_M[0], le=DEPTHS_M[1])] = DEPTH_M
     strike: tuple[FaceName, ...] = ()  # faces that are no wall below the water
 
 

@@ -84,7 +84,6 @@ def _plane(points_m: Array, grown: Plane, boat_m: Array) -> DryPlane:
             break
         mean = used.mean(axis=0)
         normal = np.linalg.svd(used - mean, full_matrices=False)[2][2]
-        normal = normal if normal @ boat_m > normal @ mean else -normal
         distance_m = float(normal @ mean)
     sense = 1.0 if normal @ boat_m > distance_m else -1.0
     normal, distance_m = sense * normal, sense * distance_m

@@ -13,6 +13,7 @@ from pipeline.atomic_files import read_json, write_text
 from pipeline.config.found import Found
 from pipeline.config.session import SessionConfig
 from pipeline.finding.find import find_place
+from pipeline.finding.place import FoundPlace
 from pipeline.finding.pool_file import pool_yaml
 from pipeline.readers.dispatch import raw_parts
 from pipeline.run import folder, provenance
@@ -25,13 +26,18 @@ from pipeline.run.workers import Workers
 FINDS = ("pipeline.finding.find", "pipeline.finding.pool_file", "pipeline.readers.dispatch")
 
 
-def found_target(session_folder: Path, session: SessionConfig, wanted: Found, workers: Workers) -> Mapping[str, Any]:
-    """Return the content of a pool's file with the target that a session's laser points show."""
+def place_in(session_folder: Path, session: SessionConfig, depth_m: float, workers: Workers) -> FoundPlace:
+    """Return the target that a session's laser points show, its faces continued to a depth below the water."""
     ins, laser = (
         Stream(raw_parts(name, getattr(session, name), session_folder), workers.map, workers.here)
         for name in ("ins", "laser")
     )
-    found: Mapping[str, Any] = yaml.safe_load(pool_yaml(find_place(ins, laser, session, wanted.depth_m)))
+    return find_place(ins, laser, session, depth_m)
+
+
+def found_target(session_folder: Path, session: SessionConfig, wanted: Found, workers: Workers) -> Mapping[str, Any]:
+    """Return the content of a pool's file with that target."""
+    found: Mapping[str, Any] = yaml.safe_load(pool_yaml(place_in(session_folder, session, wanted.depth_m, workers)))
     return found
 
 

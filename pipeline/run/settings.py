@@ -90,6 +90,8 @@ def load_settings(
     files = {"session": YamlFile.read(session_yaml(session_folder)), "config": config}
     refuse_unfilled(files.values())
     session = session_in(files["session"], with_cast)
+    if (calibrated or session.calibrated) == "laser":
+        refuse_found_target(config)
     pool = pool_in(config, None if find is None else partial(find, session))
     try:
         target_of(pool.target)
@@ -106,6 +108,16 @@ def load_settings(
     digests = {name: file.sha256 for name, file in files.items()}
     stated = {name: stated_keys(file.content) for name, file in files.items()}
     return Settings(session_folder.resolve(), pool, session, digests, stated)
+
+
+def refuse_found_target(config: YamlFile) -> None:
+    """Raise a ConfigError if a pool's file has a target that was found by a laser, or is to be found."""
+    target = config.content.get("target")
+    if isinstance(target, dict) and (target.get("kind") == "found" or target.get("found")):
+        raise ConfigError(
+            f"{config.path}: target: faces that were found lie where a laser saw them, so they cannot tell how a laser "
+            "is mounted; give faces that were surveyed"
+        )
 
 
 def refuse_unknown_faces(pool: PoolConfig, path: Path) -> None:

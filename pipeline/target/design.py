@@ -13,8 +13,8 @@ def target_of(target: Target) -> TargetModel:
     """Return the target's model. It is cached, because it takes 0.05 s and has many users: do not change it."""
     if isinstance(target, Letters):
         return _by_letters(target)
-    model = _by_faces(tuple(target.faces.items()), target.relations, target.water_level_m, target.repeats_m)
-    return replace(model, found=target.found)
+    faces = tuple(target.faces.items())
+    return _by_faces(faces, target.relations, target.water_level_m, target.repeats_m, target.found)
 
 
 @lru_cache(maxsize=16)
@@ -40,9 +40,10 @@ def _by_faces(
     relations: tuple[RelationSettings, ...],
     water_level_m: float,
     repeats_m: float | None,
+    found: bool,
 ) -> TargetModel:
     outlines = [Outline(name, face.corners, face.role or "", face.seen) for name, face in faces]
     stated = [
         Relation(kind, names, relation.name or "") for relation in relations for kind, names in relation.given.items()
     ]
-    return build_target(outlines, stated, water_level_m, repeats_m)
+    return replace(build_target(outlines, stated, water_level_m, repeats_m), found=found)

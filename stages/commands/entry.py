@@ -11,7 +11,7 @@ from typing import Any
 
 import typer
 
-from pipeline.artefacts.memory import use_one_heap
+from pipeline.artefacts.memory import use_small_heaps
 from pipeline.errors import PoolcalError
 from pipeline.language.speaking import say
 from stages.commands.usage import usage_message
@@ -84,7 +84,7 @@ def prepare_process() -> None:
     The imports make a million objects that stay: to look for garbage at every 700 takes a tenth of a second.
     """
     gc.set_threshold(50_000)
-    use_one_heap()
+    use_small_heaps()
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, _interrupted)
     for name in ("stdout", "stderr"):

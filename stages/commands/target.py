@@ -3,16 +3,15 @@
 import sys
 from pathlib import Path
 
-from pipeline.artefacts.streams import Stream
 from pipeline.atomic_files import write_text
+from pipeline.config.found import DEPTHS_M
 from pipeline.config.load import load_session
 from pipeline.errors import ConfigError
-from pipeline.finding.find import find_place
 from pipeline.finding.found_text import table_text
 from pipeline.finding.pool_file import FIRST, pool_yaml
 from pipeline.language.speaking import say
 from pipeline.readers.casts import with_cast
-from pipeline.readers.dispatch import raw_parts
+from pipeline.run.found_target import place_in
 from pipeline.run.output_files import refuse_output
 from pipeline.run.workers import workers
 
@@ -31,14 +30,13 @@ def command(folder: Path, out: Path | None, depth_m: float, jobs: int | None) ->
     jobs
         Number of workers.
     """
-    if not 0.5 <= depth_m <= 100:
-        raise ConfigError(f"--depth {depth_m:g}: must be 0.5 to 100 m, the depth of the water at the wall")
+    least, most = DEPTHS_M
+    if not least <= depth_m <= most:
+        raise ConfigError(f"--depth {depth_m:g}: must be {least:g} to {most:g} m, the depth of the water at the wall")
     refuse_output("--out", out, suffix=".yaml", begins=FIRST.encode())
     session = load_session(folder, with_cast)
     with workers(jobs, None) as pool:
-        ins = Stream(raw_parts("ins", session.ins, folder), pool.map, pool.here)
-        laser = Stream(raw_parts("laser", session.laser, folder), pool.map, pool.here)
-        place = find_place(ins, laser, session, depth_m)
+        place = place_in(folder, session, depth_m, pool)
     say(table_text(place), sys.stdout)
     if out is not None:
         write_text(out, pool_yaml(place))

@@ -1,5 +1,6 @@
 """A config that says ``target: {kind: found}``: found once, remembered, and refused in one line where it cannot be."""
 
+import inspect
 import json
 from pathlib import Path
 from typing import Any
@@ -7,8 +8,10 @@ from typing import Any
 import pytest
 import yaml
 
+from pipeline.config.found import Found
 from pipeline.run.folder import FOUND
 from pipeline.run.settings import RUN_YAML
+from stages.cli import preparing
 from tests.support.docks import DOCK
 from tests.support.places import Told, poolcal, simulate
 from tests.support.refusals import one_line
@@ -87,6 +90,10 @@ def test_what_says_nothing_true_is_refused(dock: Path, tmp_path: Path) -> None:
     assert not (dock / "run").exists()
 
 
+def test_a_command_and_a_config_have_the_same_depth() -> None:
+    assert inspect.signature(preparing._target).parameters["depth"].default == Found(kind="found").depth_m
+
+
 def test_before_anything_is_sailed_there_is_nothing_to_find(dock: Path, tmp_path: Path) -> None:
     plan = tmp_path / "plan.yaml"
     plan.write_text("passes: [{distance_m: 5}]\n", encoding="utf-8")
@@ -96,5 +103,15 @@ def test_before_anything_is_sailed_there_is_nothing_to_find(dock: Path, tmp_path
 
 def test_a_check_finds_the_target_too(dock: Path, tmp_path: Path) -> None:
     told = poolcal("check", dock, "--config", config(tmp_path))
-    assert told.status in (0, 1), told.err
-    assert "Target found" in told.out or "target" in told.out
+    assert told.status == 0, told.out
+    for face in ("wall-1", "wall-2", "wall-3"):
+        assert f"\n{face} " in told.out  # soundings expected and found on it
+
+
+def test_a_laser_is_not_calibrated_on_what_it_saw_itself(dock: Path, tmp_path: Path) -> None:
+    """Its own error is in the planes: they would confirm any coarse mount."""
+    folder, written = tmp_path / "run", tmp_path / "wall.yaml"
+    one_line(poolcal("laser", dock, "--config", config(tmp_path), "--run", folder), "target", "surveyed")
+    assert poolcal("target", dock, "--out", written).status == 0
+    one_line(poolcal("laser", dock, "--config", written, "--run", folder), "target", "surveyed")
+    assert not folder.exists()
