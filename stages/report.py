@@ -40,7 +40,7 @@ from pipeline.report.sonar_report import SonarSettings, sonar_report
 from pipeline.report.suspected_causes import errors_allowed_for
 from pipeline.report.systematic_errors import systematic_block
 from pipeline.report.verdict import Criteria, explanations, rejections
-from pipeline.report.warnings import geometry_gaps, target_off_origin, unexpected_noise
+from pipeline.report.warnings import geometry_gaps, target_found, target_off_origin, unexpected_noise
 from pipeline.target.design import target_of
 
 
@@ -105,7 +105,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         *correlated_beams(inputs.groups),
         *sigmas_too_small(inputs.estimate, config.adjust.test_level),
         *errors_allowed_for(inputs.freed, config.adjust.test_level),
-        *target_off_origin(target),
+        *(*target_off_origin(target), *target_found(model)),
         *(check for check in (drift_check, off_figures) if check is not None and check not in (NO_DRIFT, *reasons)),
         *report.pass_warnings,
         *deviations_from_design(shape, design_shape(model), shape_errors(inputs.planes, model)),

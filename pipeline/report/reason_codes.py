@@ -73,6 +73,7 @@ class ReasonCode(StrEnum):
     SIGMAS_OFF_SCATTER = "sigmas_off_scatter", "slots of time scatter more than the random sigmas say"
     MANY_OUTLIERS = "many_outliers", "an unusual share of the observations was cut as outliers"
     TARGET_OFF_ORIGIN = "target_off_origin", "the target stands far from target.origin, or out of plumb"
+    TARGET_FOUND = "target_found", "the target was found in laser points, and its faces go on below the water unproven"
     PASS_WITHOUT_SOUNDINGS = "pass_without_soundings", "in some passes the laser alone saw the target"
     PASS_WITHOUT_LASER = "pass_without_laser", "in some passes the sonar alone saw the target"
     LENGTH_OFF_DESIGN = "length_off_design", "b or e of the target is measured otherwise than designed"

@@ -199,6 +199,11 @@ REMEDIES: dict[Code, Remedy] = {
         "The target was found more than 0.1 m or 0.1° from where it should stand: its survey, or laser.mount.",
         "If it was surveyed better than that, check laser.mount and the datum of target.origin.",
     ),
+    Code.TARGET_FOUND: Remedy(
+        "Nobody drew or surveyed the target: its faces are planes in the laser's points, continued straight down.",
+        "See that each is a wall that goes on below the water, and no fender, ladder or boat; strike the others "
+        "(target.strike). Look at the residuals by height, and state in as_built how the walls may stand there.",
+    ),
     Code.PASS_WITHOUT_SOUNDINGS: Remedy(
         "In a pass the laser saw the target and the sonar has no soundings on it, or none at all: a file of the sonar "
         "may be missing.",

@@ -9,6 +9,7 @@ import pandas as pd
 from pipeline.console import plural
 from pipeline.gps_time import utc_text
 from pipeline.maths.mount_parameters import MOUNT_WORDS, PARAMETERS
+from pipeline.maths.target.model import TargetModel
 from pipeline.report.reason_codes import ReasonCode, Statement
 
 MAX_VARIANCE_FACTOR = 2.0  # of a group of observations: above this, or below its inverse, the sigmas are wrong
@@ -96,6 +97,17 @@ def target_off_origin(target: Mapping[str, Any]) -> list[Statement]:
         f"{tilts[0]:+.2f}° and {tilts[1]:+.2f}°: if it was set up and surveyed better than this, check laser.mount"
     )
     return [Statement(ReasonCode.TARGET_OFF_ORIGIN, words)]
+
+
+def target_found(model: TargetModel) -> list[Statement]:
+    """Return a warning if the target is one that was found in laser points."""
+    if not model.found:
+        return []
+    words = (
+        f"the target was found in laser points ({', '.join(face.name for face in model.faces)}): that its faces go "
+        f"straight on to {model.depth_m:.1f} m below the water is an assumption; look at the residuals by height"
+    )
+    return [Statement(ReasonCode.TARGET_FOUND, words)]
 
 
 def passes_without_files(unsounded: pd.DataFrame) -> list[Statement]:

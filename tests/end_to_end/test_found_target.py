@@ -48,6 +48,9 @@ def test_it_is_found_once_and_again_when_what_it_depends_on_changes(dock: Path, 
         assert told.status in (0, 1), told.err
         assert told.ran[-1] == "report"
         assert "exchanged" not in told.out  # a found target has no left and right to be wrong
+        calibration = json.loads((folder / "report" / "calibration.json").read_text(encoding="utf-8"))
+        assert "target_found" in calibration["warning_codes"]
+        assert "wall-1, wall-2, wall-3" in told.out
         assert "could be adjusted" not in told.out  # walls tell no height, and yet labels are without the drift
         assert sorted(faces(folder)) == ["wall-1", "wall-2", "wall-3"]
     memories = [folder / FOUND for folder in folders]

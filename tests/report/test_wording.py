@@ -7,9 +7,10 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from pipeline.config.pool import VerdictLimits
+from pipeline.config.pool import PoolConfig, VerdictLimits
 from pipeline.config.references import CastUsed
 from pipeline.config.session import Drift, Mbes
+from pipeline.config.yaml_models import parse
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.report.as_built import deviations_from_design
 from pipeline.report.calibration_document import statement_lists
@@ -24,9 +25,12 @@ from pipeline.report.warnings import (
     geometry_gaps,
     passes_with_one_sensor,
     passes_without_files,
+    target_found,
     target_off_origin,
     unexpected_noise,
 )
+from pipeline.target.design import target_of
+from tests.support.docks import DOCK
 from tests.support.evidence import (
     ADJUSTED,
     FIGURES,
@@ -45,6 +49,8 @@ from tests.support.evidence import (
     methods,
 )
 from tests.support.reason_cases import REASONS
+
+MODEL = target_of(parse(PoolConfig, {"target": DOCK["target"]}, "pool").target)
 
 IN_TURN = replace(ADJUSTED, method="patent_alternating")
 OF_LASER = replace(ADJUSTED, search=replace(SEARCH, sensor="laser", max_angle_deg=1.5, max_lever_arm_m=float("inf")))
@@ -171,6 +177,11 @@ OTHERS: list[tuple[Callable[[], Iterable[Statement]], ReasonCode, str]] = [
         lambda: unexpected_noise(groups(cut=11)),
         ReasonCode.MANY_OUTLIERS,
         "1.1 % of soundings on horizontal faces were cut as outliers",
+    ),
+    (
+        lambda: target_found(replace(MODEL, found=True)),
+        ReasonCode.TARGET_FOUND,
+        "go straight on to 4.0 m below the water is an assumption",
     ),
     (
         lambda: target_off_origin(FOUND | {"tilt_deg": [0.0, 0.11]}),
