@@ -10,9 +10,11 @@ from pipeline.adjustment.error_sources import stated_of
 from pipeline.adjustment.ins_drift import drift_model, sigmas_from_files
 from pipeline.artefacts.catalogue.results import CALIBRATION, CALIBRATION_JSON, CALIBRATION_YAML, CLOSING
 from pipeline.artefacts.schema import Provenance
-from pipeline.config.pool import Adjust, AsBuilt, LaserFit, Method, Segment, VerdictLimits
+from pipeline.config.pool import Adjust, AsBuilt, LaserFit, Method, Segment
 from pipeline.config.session import Calibrated, Ins, Laser, Mbes
 from pipeline.config.target import Target
+from pipeline.config.verdict import VerdictLimits
+from pipeline.limits.verdict_limits import limits_document, limits_of, purpose_in_words
 from pipeline.report.as_built import design_shape, deviations_from_design, measured_shape, shape_errors
 from pipeline.report.calibration_document import (
     SCHEMA,
@@ -66,6 +68,11 @@ class Config:
         """The settings of the calibrated sensor."""
         return self.mbes if self.calibrated == "mbes" and self.mbes is not None else self.laser
 
+    @property
+    def limits(self) -> VerdictLimits:
+        """The limits of the verdict on the calibrated sensor."""
+        return limits_of(self.verdict, self.calibrated)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Inputs(Evidence):
@@ -116,11 +123,11 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         "schema": SCHEMA,
         "session": config.name,
         "verdict": verdict,
-        "verdict_in_words": verdict_in_words(verdict, report.held),
+        "verdict_in_words": verdict_in_words(verdict, report.held, purpose_in_words(config.limits)),
         **statement_lists("reason", reasons),
         "hypotheses": hypotheses_block(explanations(inputs, criteria)),
         **statement_lists("warning", warnings),
-        "limits": config.verdict.model_dump(),
+        "limits": limits_document(config.limits),
         "result": report.method,
         **report.result_keys,
         "coarse": {"mount": report.coarse.settings()},
@@ -151,7 +158,7 @@ def _sensor_report(evidence: Evidence, config: Config, passes: Sequence[dict[str
     sensor = config.sensor
     if isinstance(sensor, Laser):
         assert config.laser_fit is not None
-        return laser_report(sensor, evidence, config.segment, config.verdict, config.laser_fit)
+        return laser_report(sensor, evidence, config.segment, config.limits, config.laser_fit)
     settings = SonarSettings(
         mbes=sensor, segment=config.segment, method=config.result, sides=config.target.sides
     )
@@ -169,7 +176,7 @@ def _systematic(freed: pd.DataFrame, config: Config) -> dict[str, Any]:
 def _criteria(config: Config, report: SensorReport) -> Criteria:
     """Return the criteria by which the calibration is judged."""
     return Criteria(
-        limits=config.verdict,
+        limits=config.limits,
         test_level=config.adjust.test_level,
         tolerance_m=config.adjust.test_tolerance_m,
         method=report.method,

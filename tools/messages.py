@@ -27,7 +27,7 @@ PLACES = (  # where texts for people are made
     "pipeline/exports", "pipeline/finding/dry_planes.py", "pipeline/finding/found_text.py",
     "pipeline/finding/kept_points.py", "pipeline/finding/place.py", "pipeline/fleet", "pipeline/georeference",
     "pipeline/language/chosen.py", "pipeline/maths",
-    "pipeline/planning", "pipeline/readers", "pipeline/report", "pipeline/results", "pipeline/run",
+    "pipeline/limits", "pipeline/planning", "pipeline/readers", "pipeline/report", "pipeline/results", "pipeline/run",
     "pipeline/simulation", "pipeline/starting", "pipeline/target", "stages",
 )  # fmt: skip
 PROSE = re.compile(r"[A-Za-z]{2,}[,;:.]? +\(?[A-Za-z{]|\} [A-Za-z]{2,}")

@@ -10,6 +10,7 @@ from pydantic import Field, field_validator, model_validator
 
 from pipeline.config.quantities import Model, NotNegative, Positive, SigmaDeg, SigmaM
 from pipeline.config.target import Origin, Target
+from pipeline.config.verdict import VerdictLimits
 
 FARTHEST = 1.5  # farthest correction of the coarse mount that is accepted, in units of segment.search_mount_...
 
@@ -132,13 +133,6 @@ class LaserFit(Model):
     coarse_sigma_deg: SigmaDeg = 0.5  # of each coarse angle, without laser.mount_covariance
     coarse_sigma_m: SigmaM = 0.05
     hold_share: Annotated[float, Field(gt=0, le=1)] = 0.5  # of its coarse sigma: above, it rests on the coarse mount
-
-
-class VerdictLimits(Model):
-    """The largest total sigmas of an accepted calibration."""
-
-    max_sigma_deg: Positive = 0.05
-    max_sigma_m: Positive = 0.005
 
 
 Method = Literal["patent_sequential", "patent_alternating", "adjustment"]  # patent_literal is never the result

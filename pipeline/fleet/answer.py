@@ -8,7 +8,7 @@ from typing import Any
 
 from pipeline.console import plural
 from pipeline.maths.mount_parameters import PARAMETERS
-from pipeline.report.reason_codes import verdict_in_words
+from pipeline.report.reason_codes import verdict_of
 
 ACCEPTED, REJECTED, COULD_NOT_RUN, BUG = range(4)  # the exit statuses of poolcal run
 INTERRUPTED = 130  # exit code of a process after SIGINT
@@ -64,7 +64,7 @@ def answer_about(result: Mapping[str, Any], ran: list[str], not_drawn: list[str]
         As in Answer.
     """
     held, reasons = result.get("held", {}), result["reasons"]
-    verdict = verdict_in_words(result["verdict"], held).partition(":")[0]  # the mount shows which values
+    verdict = verdict_of(result).partition(":")[0]  # the mount shows which values
     if result["verdict"] != "accepted":
         more = f"; and {plural(len(reasons) - 1, 'other reason')}" if len(reasons) > 1 else ""
         return Answer(REJECTED, ran, reasons[0] + more, verdict, not_drawn=not_drawn)

@@ -13,11 +13,13 @@ from pipeline.adjustment.iteration import estimated_columns
 from pipeline.adjustment.problem import faces_on_surfaces
 from pipeline.config.instruments import deep_merge
 from pipeline.config.plan import Budget, Pass, Plan
-from pipeline.config.pool import PoolConfig, VerdictLimits
+from pipeline.config.pool import PoolConfig
 from pipeline.config.session import SessionConfig
+from pipeline.config.verdict import VerdictLimits
 from pipeline.config.yaml_file import read_yaml
 from pipeline.config.yaml_models import parse
 from pipeline.errors import ConfigError
+from pipeline.limits.verdict_limits import largest_sigmas, limits_by_setting, soundings_too_uncertain
 from pipeline.maths.adjustment.solution import ConsiderErrors, Solution, solve, weakest_direction
 from pipeline.maths.mount_parameters import N_MOUNT, PARAMETERS
 from pipeline.mount import mount_of
@@ -182,7 +184,7 @@ def assess_plan(plan: Plan, pool: PoolConfig, session: SessionConfig) -> PlanAss
     advice = geometry_advice(setting, coverage, given.predicted.normal + prior, given.solution)
     better = None
     if plan.candidates and plan.budget is not None:
-        better = _best_within_budget(adjustment, plan.candidates, plan.budget.seconds)
+        better = _best_within_budget(adjustment, plan.candidates, plan.budget.seconds, pool.verdict)
     return PlanAssessment(setting, given, [*_blind_passes(given), *advice.gaps], advice.remedy, better)
 
 
@@ -206,16 +208,17 @@ def soundings_by_family(setting: PredictionSetting, accuracy: Accuracy) -> dict[
     return {family: round(count) for family, count in total.items()}
 
 
-def _best_within_budget(adjustment: _Adjustment, candidates: Sequence[Pass], seconds: float) -> Accuracy | None:
+def _best_within_budget(
+    adjustment: _Adjustment, candidates: Sequence[Pass], seconds: float, limits: VerdictLimits
+) -> Accuracy | None:
     """Return the accuracy of the list of candidates that helps most; None if there is no time for any.
 
     The list grows by one candidate at a time: the one that reduces the mean square of the six sigmas most for its time.
-    Each sigma is divided by the default limit of the verdict. A candidate may be chosen more than once.
+    Each sigma is divided by its limit of the verdict. A candidate may be chosen more than once.
     """
     setting, free, turn_s = adjustment.setting, adjustment.free, adjustment.turn_s
     predicted = [predict(setting, [candidate], phases=1) for candidate in candidates]
-    usual = VerdictLimits()
-    bounds = np.repeat([np.radians(usual.max_sigma_deg), usual.max_sigma_m], 3)
+    bounds = largest_sigmas(limits)
     vague = np.zeros((setting.state.size, setting.state.size))
     vague[free, free] = VAGUE**-2
     vague = vague + adjustment.prior
@@ -255,12 +258,12 @@ def shares_of_limits(setting: PredictionSetting, accuracy: Accuracy, limits: Ver
         Limits of the verdict.
     """
     sigma = mount_of(setting.mbes.mount).sigmas(accuracy.total)
-    bounds = {"deg": limits.max_sigma_deg, "m": limits.max_sigma_m}
-    return {name: sigma[key] / bounds[unit] for name, _, key, unit in PARAMETERS}
+    largest = limits_by_setting(limits)
+    return {name: sigma[key] / largest[key] for name, _, key, _ in PARAMETERS}
 
 
 def is_enough(assessment: PlanAssessment, limits: VerdictLimits) -> bool:
-    """Return whether the plan's passes will keep all total sigmas within the verdict's limits."""
-    if assessment.given.solution.deficiency:
+    """Return whether the plan's passes will keep all total sigmas, and soundings, within the verdict's limits."""
+    if assessment.given.solution.deficiency or soundings_too_uncertain(limits, assessment.given.total):
         return False
     return all(share <= 1 for share in shares_of_limits(assessment.setting, assessment.given, limits).values())

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from pipeline.config.pool import VerdictLimits
+from pipeline.config.verdict import VerdictLimits
+from pipeline.limits.verdict_limits import limits_by_setting
 from pipeline.maths.mount_parameters import MOUNT_NAMES, MOUNT_WORDS, PARAMETERS
 from pipeline.report.cause_words import size_words
 from pipeline.report.reason_codes import ReasonCode, Statement
@@ -79,10 +80,10 @@ def share_of_coarse_mount(
     if sigmas is not None:
         total = estimate.set_index("unknown")["sigma_total"]
         coarse = freed.set_index("unknown")["considered"]
-        bounds = {"deg": limits.max_sigma_deg, "m": limits.max_sigma_m}
-        for name, place, key, unit in PARAMETERS:
+        largest = limits_by_setting(limits)
+        for name, place, key, _ in PARAMETERS:
             parameter = MOUNT_NAMES[place]
-            if not sigmas[key] <= bounds[unit]:
+            if not sigmas[key] <= largest[key]:
                 above_limit[name] = sigmas[key]
             if not total[parameter] <= hold_share * coarse[parameter]:
                 unimproved[name] = sigmas[key]

@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from pipeline.config.pool import LaserFit, Segment, VerdictLimits
+from pipeline.config.pool import LaserFit, Segment
 from pipeline.config.session import Laser
+from pipeline.config.verdict import VerdictLimits
 from pipeline.mount import mount_of
 from pipeline.report.ambiguities import MountSearch
 from pipeline.report.coarse_mount import share_of_coarse_mount

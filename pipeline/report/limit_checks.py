@@ -1,12 +1,13 @@
-"""Reasons to reject by the limits of the total sigmas, for the adjustment and for a form of the patent."""
+"""Reasons to reject by the limits of the verdict: total sigmas, soundings, and the difference of a patent's form."""
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.config.pool import VerdictLimits
+from pipeline.config.verdict import VerdictLimits
+from pipeline.limits.verdict_limits import in_report_units, largest_sigmas, limits_by_setting, soundings_too_uncertain
 from pipeline.maths.mount_parameters import MOUNT_WORDS, PARAMETERS
 from pipeline.report.reason_codes import ReasonCode, Statement
 
@@ -31,15 +32,30 @@ def sigmas_above_limit(
     """
     if sigmas is None:
         return [Statement(ReasonCode.NO_COVARIANCE, "the adjustment has no covariance")]
-    bounds = {"deg": (limits.max_sigma_deg, "°"), "m": (limits.max_sigma_m, " m")}
+    largest, symbols = limits_by_setting(limits), {"deg": "°", "m": " m"}
     found = []
     for name, place, key, unit in PARAMETERS:
-        limit, symbol = bounds[unit]
+        limit, symbol = largest[key], symbols[unit]
         if name not in held and not sigmas[key] <= limit:
-            above, most = f"{sigmas[key]:.4g}{symbol}", f"{limit:g}{symbol}"
+            above, most = f"{sigmas[key]:.4g}{symbol}", f"{limit:.4g}{symbol}"
             words = f"total sigma of {MOUNT_WORDS[place]} is {above}, above the limit of {most}"
             found.append(Statement(ReasonCode.SIGMA_ABOVE_LIMIT, f"{words}{_largest(sources, place, unit)}"))
     return found
+
+
+def soundings_above_limit(
+    covariance: Sequence[Sequence[float]] | None, limits: VerdictLimits
+) -> Iterator[Statement]:
+    """Yield a reason if all errors of the sonar's mount together take too much of what an order of survey allows.
+
+    Parameters
+    ----------
+    covariance : (6, 6) total covariance of the sonar's mount, rad and m; None if the adjustment has none
+    limits : limits of the verdict
+    """
+    words = "" if covariance is None else soundings_too_uncertain(limits, np.array(covariance))
+    if words:
+        yield Statement(ReasonCode.SOUNDINGS_ABOVE_LIMIT, words)
 
 
 def _largest(sources: Mapping[str, NDArray[np.float64]], place: int, unit: str) -> str:
@@ -74,12 +90,12 @@ def patent_reasons(
         yield Statement(ReasonCode.PATENT_NOT_CONVERGED, f"{method} did not converge in {row['iterations']} turns")
         return
     patent, adjusted = methods[method]["correction"], methods["adjustment"]["correction"]
-    bounds = {"rotation_vector_deg": (limits.max_sigma_deg, "°", 0), "lever_arm_m": (limits.max_sigma_m, " m", 3)}
-    for part, (limit, unit, first) in bounds.items():
+    largest = in_report_units(largest_sigmas(limits))
+    for part, unit, first in (("rotation_vector_deg", "°", 0), ("lever_arm_m", " m", 3)):
         for place, (value, reference) in enumerate(zip(patent[part], adjusted[part], strict=True), start=first):
-            if abs(value - reference) > limit:
+            if abs(value - reference) > largest[place]:
                 yield Statement(
                     ReasonCode.PATENT_OFF_ADJUSTMENT,
                     f"{method} differs from the adjustment by {value - reference:+.4f}{unit} in {MOUNT_WORDS[place]}, "
-                    f"more than {limit:g}{unit}",
+                    f"more than {largest[place]:.4g}{unit}",
                 )

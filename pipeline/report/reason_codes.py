@@ -3,10 +3,10 @@
 People read the words beside a code, which may be mended. Programs read the code, which never changes.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Self
+from typing import Any, Self
 
 from pipeline.maths.mount_parameters import PARAMETERS
 
@@ -37,6 +37,7 @@ class ReasonCode(StrEnum):
     COARSE_MOUNT_CONTRADICTED = "coarse_mount_contradicted", "the points contradict the laser's coarse mount"
     NO_COVARIANCE = "no_covariance", "the adjustment has no covariance"
     SIGMA_ABOVE_LIMIT = "sigma_above_limit", "the total sigma of a mount parameter is above verdict's limit"
+    SOUNDINGS_ABOVE_LIMIT = "soundings_above_limit", "the mount alone takes too much of what soundings may be wrong by"
     ESTIMATE_OFF_SETTINGS = "estimate_off_settings", "a parameter of adjust.free is significantly not as configured"
 
     # Mean residuals beyond the tolerance: these reject.
@@ -93,12 +94,27 @@ class Statement:
     words: str
 
 
-def verdict_in_words(verdict: str, held: Collection[str] = ()) -> str:
-    """Return the verdict in words; ``held``: mount parameters for which an accepted calibration is not good enough.
+def verdict_in_words(verdict: str, held: Collection[str] = (), purpose: str = "") -> str:
+    """Return the verdict in words.
+
+    Parameters
+    ----------
+    verdict : ``accepted`` or ``rejected``
+    held : mount parameters for which an accepted calibration is not good enough
+    purpose : what an accepted calibration is good for, in words; empty: for every survey
 
     >>> verdict_in_words("accepted"), verdict_in_words("accepted", ["yaw", "x"]), verdict_in_words("rejected", ["yaw"])
     ('accepted', 'accepted in part: roll, pitch, y, z', 'rejected')
+    >>> verdict_in_words("accepted", (), "Order 1a (IHO S-44) down to 20 m, beams to 60°")
+    'accepted for Order 1a (IHO S-44) down to 20 m, beams to 60°'
     """
+    if verdict == "accepted" and purpose:
+        return f"accepted for {purpose}"
     if verdict != "accepted" or not held:
         return verdict
     return f"accepted in part: {', '.join(name for name, *_ in PARAMETERS if name not in held)}"
+
+
+def verdict_of(result: Mapping[str, Any]) -> str:
+    """Return the verdict in words, from the content of calibration.json, an older version's too."""
+    return verdict_in_words(result["verdict"], result.get("held", {}), result.get("limits", {}).get("in_words", ""))

@@ -76,6 +76,11 @@ REMEDIES: dict[Code, Remedy] = {
         "Work on the largest source: a cast for the sound speed, a survey of the wet faces, a better laser mount, more "
         "passes at other distances. poolcal plan tells what passes would give.",
     ),
+    Code.SOUNDINGS_ABOVE_LIMIT: Remedy(
+        "Each value is within its own limit, but all together make soundings more uncertain than verdict.purpose "
+        "allows at verdict.depth_m and verdict.swath_deg.",
+        "As for sigma_above_limit; or survey with the beams nearer the vertical, or in less depth, and state that.",
+    ),
     Code.ESTIMATE_OFF_SETTINGS: Remedy(
         "A parameter that you named in adjust.free came out significantly different from session.yaml.",
         "Find the cause, enter the value found (mbes.latency_s, laser.latency_s, mbes.sound_speed_m_s), run again, and "

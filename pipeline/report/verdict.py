@@ -17,8 +17,9 @@ The limits are defined at these places (paths from ``pipeline/``):
 * drift of the INS, beside deviating residuals or a suspected cause: ``MAX_DRIFT_RATIO`` of drift_check.py;
 * suspected causes, estimates off their settings, a contradicted coarse mount of the laser: ``test_level`` of class
   ``Adjust``;
-* total sigmas, and difference of a patent's form from the adjustment: ``max_sigma_deg`` and ``max_sigma_m`` of class
-  ``VerdictLimits`` of config/pool.py;
+* total sigmas, and difference of a patent's form from the adjustment: class ``VerdictLimits`` of config/verdict.py,
+  ``POOL_...`` and ``MOST_...`` of limits/verdict_limits.py;
+* uncertainty of soundings by all errors of the mount together: ``mount_share`` of the same class;
 * no mount parameter of the laser good enough: ``hold_share`` of class ``LaserFit`` of config/pool.py, and the limits of
   the total sigmas;
 * result and convergence of a patent's form: classes ``FitPlanes``, ``AngleIterate`` and ``Offsets`` of config/pool.py.
@@ -35,14 +36,15 @@ from typing import Any
 
 import pandas as pd
 
-from pipeline.config.pool import Method, VerdictLimits
+from pipeline.config.pool import Method
+from pipeline.config.verdict import VerdictLimits
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.report.ambiguities import MountSearch, ambiguities
 from pipeline.report.coarse_mount import contradicted_coarse_mount
 from pipeline.report.evidence import Evidence
 from pipeline.report.hypotheses import Hypothesis, hypotheses
 from pipeline.report.label_checks import noise_cut_by_gate, too_few_soundings
-from pipeline.report.limit_checks import patent_reasons, sigmas_above_limit
+from pipeline.report.limit_checks import patent_reasons, sigmas_above_limit, soundings_above_limit
 from pipeline.report.part_checks import disagreeing_parts
 from pipeline.report.reason_codes import ReasonCode, Statement
 from pipeline.report.residual_tests import deviating_parts, deviations
@@ -126,6 +128,7 @@ def rejections(
         reasons.append(Statement(ReasonCode.NO_PARAMETER_ESTIMABLE, words))
     sources = contributions(evidence.freed, methods["adjustment"], criteria.laser_correlates)
     wide = sigmas_above_limit(methods["adjustment"]["sigma_mount_total"], criteria.limits, criteria.held, sources)
+    wide += soundings_above_limit(methods["adjustment"]["covariance_total"], criteria.limits)
     reasons += [off_figures, *wide] if wide and off_figures is not None else wide
     if criteria.method != "adjustment" and evidence.corrections is not None:
         row = evidence.corrections.set_index("method").loc[criteria.method]

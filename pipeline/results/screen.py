@@ -7,7 +7,7 @@ from typing import Any
 from pipeline.console import signed
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.mount import setting_change
-from pipeline.report.reason_codes import verdict_in_words
+from pipeline.report.reason_codes import verdict_of
 from pipeline.text_table import SCREEN, text_table, wrapped
 
 SIGMAS_IN_WORDS = {
@@ -25,8 +25,9 @@ SIGMAS_IN_WORDS = {
 def summary(calibration: Mapping[str, Any]) -> str:
     """Return the result as text for the screen, from the content of calibration.json."""
     held = calibration.get("held", {})
-    verdict, colon, good = verdict_in_words(calibration["verdict"], held).partition(": ")
-    lines = [f"{calibration['session']}: {verdict.upper()}{colon}{good}"]
+    verdict, colon, good = verdict_of(calibration).partition(": ")
+    verdict, word, purpose = verdict.partition(" for ")
+    lines = [f"{calibration['session']}: {verdict.upper()}{word}{purpose}{colon}{good}"]
     rejected = calibration["verdict"] == "rejected"
     lines += _indented(f"because {reason}" for reason in calibration["reasons"])
     lines += [f"  not good enough: {', '.join(held)}"] if colon else []

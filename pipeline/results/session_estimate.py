@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.adjustment.error_sources import OWNERS
-from pipeline.config.pool import VerdictLimits
+from pipeline.config.verdict import VerdictLimits
+from pipeline.limits.verdict_limits import largest_sigmas
 from pipeline.maths.comparison import MountEstimate
-from pipeline.maths.mount_parameters import N_MOUNT
+from pipeline.maths.mount_parameters import N_MOUNT, PARAMETERS
 
 Array = NDArray[np.float64]
 
@@ -76,13 +77,22 @@ def session_estimate(result: Mapping[str, Any]) -> SessionEstimate | None:
     if not min(np.linalg.eigvalsh(matrix).min() for matrix in (covariance, total)) > 0:
         raise ValueError("a covariance is not positive")
     systematic = result.get("systematic")
-    limits = VerdictLimits.model_validate(result.get("limits", {}))
     return SessionEstimate(
         mount=MountEstimate(R_body_from_mbes, lever_arm, covariance),
         covariance_total=total,
         systematic=None if systematic is None else {owner: _errors(systematic[owner]) for owner in OWNERS},
-        limits=np.repeat([np.radians(limits.max_sigma_deg), limits.max_sigma_m], 3),
+        limits=_limits(result.get("limits", {})),
     )
+
+
+def _limits(block: Mapping[str, Any]) -> Array:
+    """Return the limits (6,), rad and m, of the block ``limits``; an older version wrote two numbers, or none."""
+    if "each" not in block:
+        return largest_sigmas(VerdictLimits.model_validate(block))
+    limits = np.zeros(N_MOUNT)
+    for _, place, key, unit in PARAMETERS:
+        limits[place] = np.radians(block["each"][key]) if unit == "deg" else block["each"][key]
+    return _array(limits, (N_MOUNT,))
 
 
 def _errors(block: Mapping[str, Any]) -> SharableErrors:

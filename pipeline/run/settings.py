@@ -18,9 +18,11 @@ from pipeline.config.pool import PoolConfig
 from pipeline.config.session import Calibrated, Mbes, SessionConfig
 from pipeline.config.stage_settings import settings_by_name
 from pipeline.config.target import Target
+from pipeline.config.verdict import VerdictLimits
 from pipeline.config.yaml_file import SESSION_YAML, YamlFile, content_of, read_yaml, text_of
 from pipeline.config.yaml_models import parse
 from pipeline.errors import ArtefactError, ConfigError
+from pipeline.limits.verdict_limits import limits_of
 from pipeline.readers.casts import with_cast
 from pipeline.target.design import target_of
 
@@ -40,6 +42,11 @@ class Settings:
     session: SessionConfig
     files: Mapping[str, str] = field(default_factory=dict)
     stated: Mapping[str, Sequence[str]] = field(default_factory=dict)
+
+    @property
+    def limits(self) -> VerdictLimits:
+        """The limits of the verdict on the calibrated sensor."""
+        return limits_of(self.pool.verdict, self.session.calibrated)
 
     def resolved(self) -> dict[str, Any]:
         """Return every setting by the name under which a stage's Config asks for it."""

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from pipeline.atomic_files import read_json
 from pipeline.config.mount import Mount
-from pipeline.config.pool import VerdictLimits
+from pipeline.config.verdict import VerdictLimits
 from pipeline.errors import ConfigError
+from pipeline.limits.verdict_limits import in_report_units, largest_sigmas
 from pipeline.maths.comparison import mount_error
 from pipeline.maths.mount_parameters import PARAMETERS, SETTINGS
 from pipeline.mount import Mounted
@@ -124,7 +125,7 @@ def _sigma_of(values: dict[str, Any]) -> Array | None:
 
 
 def _largest(verdict: VerdictLimits) -> Array:
-    return np.repeat([verdict.max_sigma_deg, verdict.max_sigma_m], 3)
+    return in_report_units(largest_sigmas(verdict))
 
 
 def _table(

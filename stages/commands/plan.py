@@ -7,8 +7,9 @@ import yaml
 
 from pipeline.atomic_files import write_text, writing
 from pipeline.config.plan import Pass
-from pipeline.config.pool import VerdictLimits
+from pipeline.config.verdict import VerdictLimits
 from pipeline.console import plural
+from pipeline.limits.verdict_limits import limits_by_setting, soundings_too_uncertain
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.mount import mount_of
 from pipeline.planning import assessment
@@ -58,6 +59,8 @@ def table(answer: PlanAssessment, limits: VerdictLimits) -> str:
     setting, plan = answer.setting, answer.setting.plan
     rows = [(1, one, seconds, points) for one, seconds, points in answer.given.each()]
     lines = ["As given:", *_passes(setting, rows), *_sigmas(setting, answer.given, limits)]
+    if not answer.given.solution.deficiency and (uncertain := soundings_too_uncertain(limits, answer.given.total)):
+        lines.append(f"But: {uncertain}.")
     lines += [f"But: {gap}." for gap in answer.gaps]
     if answer.weakest:
         lines.append(f"Geometry: {answer.weakest}.")
@@ -122,9 +125,9 @@ def _sigmas(setting: PredictionSetting, accuracy: Accuracy, limits: VerdictLimit
         return [*text_table(layout, heads, []), f"  {open_ones} of the unknowns left open: no result"]
     mounted = mount_of(setting.mbes.mount)
     random, total = mounted.sigmas(accuracy.random), mounted.sigmas(accuracy.total)
-    rows = []
+    rows, largest = [], limits_by_setting(limits)
     for name, _, key, unit in PARAMETERS:
-        limit, sign = (limits.max_sigma_deg, "°") if unit == "deg" else (limits.max_sigma_m, "m")
+        limit, sign = largest[key], "°" if unit == "deg" else "m"
         over = "above the limit" if not total[key] <= limit else ""
         rows.append((name, *(f"{value:.4f} {sign}" for value in (random[key], total[key], limit)), over))
     return text_table(layout, heads, rows)

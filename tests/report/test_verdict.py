@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 
 from pipeline.adjustment.pattern_tests import passes_test, pattern_tests
-from pipeline.config.pool import VerdictLimits
 from pipeline.config.session import Drift
+from pipeline.config.verdict import VerdictLimits
 from pipeline.maths.adjustment.mean_tests import joint_limit
 from pipeline.maths.mount_parameters import MOUNT_NAMES, PARAMETERS
 from pipeline.report.coarse_mount import share_of_coarse_mount

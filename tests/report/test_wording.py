@@ -4,12 +4,14 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import pytest
 
-from pipeline.config.pool import PoolConfig, VerdictLimits
+from pipeline.config.pool import PoolConfig
 from pipeline.config.references import CastUsed
 from pipeline.config.session import Drift, Mbes
+from pipeline.config.verdict import VerdictLimits
 from pipeline.config.yaml_models import parse
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.report.as_built import deviations_from_design
@@ -17,6 +19,7 @@ from pipeline.report.calibration_document import statement_lists
 from pipeline.report.cast_checks import cast_origin_warnings, cast_warnings
 from pipeline.report.drift_check import check_ins_drift, figures_disagree
 from pipeline.report.label_checks import unsettled_labels
+from pipeline.report.limit_checks import soundings_above_limit
 from pipeline.report.noise_warnings import correlated_beams, sigmas_too_small, uneven_noise
 from pipeline.report.reason_codes import ReasonCode, Statement
 from pipeline.report.suspected_causes import errors_allowed_for
@@ -89,6 +92,12 @@ OTHERS: list[tuple[Callable[[], Iterable[Statement]], ReasonCode, str]] = [
         lambda: judged(evidence(), replace(ADJUSTED, limits=VerdictLimits(max_sigma_deg=0.0059, max_sigma_m=1.0))),
         ReasonCode.SIGMA_ABOVE_LIMIT,
         "total sigma of yaw is 0.006°, above the limit of 0.0059°",
+    ),
+    (
+        lambda: soundings_above_limit(np.diag([4e-6] * 6).tolist(), VerdictLimits(purpose="special_order")),
+        ReasonCode.SOUNDINGS_ABOVE_LIMIT,
+        "by the mount alone a sounding is uncertain by 0.136 m (95 %) in height, at a depth of 20 m, 60° from the "
+        "vertical: 47 % of the 0.292 m that Special Order allows, above the share of 30 %",
     ),
     (
         lambda: judged(evidence(alternating={"reason": "the sonar sees no horizontal face"}), IN_TURN),

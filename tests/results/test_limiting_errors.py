@@ -35,7 +35,7 @@ def test_the_largest_is_named_for_each_value() -> None:
         "more passes make it smaller"
     )
     assert pitch.endswith(
-        "; most of that comes from how the wet faces may stand against the dry ones: survey them with the pool filled"
+        "; most of that comes from how the wet faces may stand against the dry ones: survey them below the water"
     )
     assert "; the largest part of that comes from how the wet faces" in yaw  # 1.44 of 3.65
     assert x.startswith("Lever arm x is known to ±8.4 mm (95 %); most of that comes from the noise")

@@ -42,7 +42,7 @@ def contents() -> Callable[[Path], dict[str, bytes]]:
 
 def _verdict(inputs: Any, config: Any) -> toys.TellOutputs:
     """Accepted up to a sigma of 1 m; the mean makes one result differ from another."""
-    verdict = "accepted" if config.verdict.max_sigma_m <= 1 else "rejected"
+    verdict = "accepted" if (config.verdict.max_sigma_m or 0.0) <= 1 else "rejected"
     found = {"verdict": verdict, "mean": float(inputs.means["mean_m"][0]), "limit": config.verdict.max_sigma_m}
     return toys.TellOutputs(json.dumps(found))
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipeline.config.pool import VerdictLimits
+from pipeline.config.verdict import VerdictLimits
 from pipeline.maths.mount_parameters import MOUNT_NAMES
 from pipeline.report.ambiguities import MountSearch
 from pipeline.report.evidence import Evidence

@@ -24,7 +24,7 @@ import stages
 import stages.commands.draw
 from pipeline.artefacts.catalogue.results import CALIBRATION_JSON
 from pipeline.artefacts.schema import Provenance
-from pipeline.config.pool import VerdictLimits
+from pipeline.config.verdict import VerdictLimits
 from tests.support import toys
 
 REPEAT_WORKER = "as-a-worker-of-poolcal-repeat"
@@ -50,7 +50,7 @@ class Outputs:
 def _run(inputs: Inputs, config: Config) -> Outputs:
     import json
 
-    code = round(config.verdict.max_sigma_m)
+    code = round(config.verdict.max_sigma_m or 0)
     if code == 3:
         raise ZeroDivisionError("a toy bug")
     if code == 6:

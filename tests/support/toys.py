@@ -12,8 +12,9 @@ import pandas as pd
 from pipeline.artefacts.columns import F64, I16, I64, TEXT
 from pipeline.artefacts.schema import Artefact, Column, Document, Provenance, RawFiles
 from pipeline.artefacts.streams import EMPTY_STREAM, Batch, BatchResult, Chunk, Stream
-from pipeline.config.pool import Ingest, Segment, VerdictLimits
+from pipeline.config.pool import Ingest, Segment
 from pipeline.config.session import Laser
+from pipeline.config.verdict import VerdictLimits
 from pipeline.errors import RawDataError
 
 POINTS = Artefact(

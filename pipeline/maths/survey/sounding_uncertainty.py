@@ -29,27 +29,34 @@ ON_A_LINE, IN_A_PLANE = (float(np.sqrt(chdtri(dimensions, 0.05))) for dimensions
 
 @dataclass(frozen=True)
 class Order:
-    """An order of survey of IHO S-44, edition 6, table 1: the largest total uncertainties allowed, at 95 %.
+    """An order of survey, as in IHO S-44, edition 6, table 1: the largest total uncertainties allowed, at 95 %.
 
     Attributes
     ----------
     name : its name
     a_m : part of the vertical uncertainty that does not vary with the depth
     b : part that varies, by depth
-    horizontal_m : horizontal uncertainty (THU) in metres
+    horizontal_m : part of the horizontal uncertainty (THU) that does not vary with the depth
+    horizontal_by_depth : part that varies, by depth
     """
 
     name: str
     a_m: float
     b: float
     horizontal_m: float
+    horizontal_by_depth: float = 0.0
 
     def vertical_m(self, depth_m: float) -> float:
         """Return the largest vertical uncertainty (TVU) at a depth: √(a² + (b d)²), section 3.2.3 of S-44."""
         return float(np.hypot(self.a_m, self.b * depth_m))
 
+    def horizontal_at_m(self, depth_m: float) -> float:
+        """Return the largest horizontal uncertainty (THU) at a depth."""
+        return self.horizontal_m + self.horizontal_by_depth * depth_m
 
-ORDERS = (Order("Special Order", 0.25, 0.0075, 2.0), Order("Exclusive Order", 0.15, 0.0075, 1.0))
+
+SPECIAL, EXCLUSIVE = Order("Special Order", 0.25, 0.0075, 2.0), Order("Exclusive Order", 0.15, 0.0075, 1.0)
+ORDERS = (SPECIAL, EXCLUSIVE)  # those shown beside each other
 
 
 @dataclass(frozen=True)

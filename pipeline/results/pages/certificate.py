@@ -11,7 +11,9 @@ from pipeline.artefacts.catalogue.points import PASSES
 from pipeline.artefacts.catalogue.results import CALIBRATION_JSON
 from pipeline.config.about import About
 from pipeline.config.session import SessionConfig
+from pipeline.config.verdict import VerdictLimits
 from pipeline.console import plural
+from pipeline.limits.verdict_limits import order_of
 from pipeline.maths.survey.sounding_uncertainty import ORDERS, table_of_soundings
 from pipeline.mount import WITHIN_95, mount_of
 from pipeline.report.method_blocks import mounted_of
@@ -58,6 +60,7 @@ def certificate_values(
     """
     session = settings.session
     block = result[session.calibrated]
+    covariance = block["covariance_total"]
     sonar = session.calibrated == "mbes"
     coarse = mount_of(session.sonar.mount if sonar else session.laser.mount)
     return {
@@ -76,7 +79,7 @@ def certificate_values(
             for row in rows
         ],
         "drawings": sign_drawings(mounted_of(block) if block["mount"] else coarse, sonar),
-        "soundings": _soundings(block["covariance_total"]) if sonar and block["covariance_total"] else None,
+        "soundings": _soundings(covariance, settings.limits) if sonar and covariance else None,
         "done": _done(result, sonar),
         "speed": _speed(tables.table(PASSES)),
         "assumed": list(assumed_groups(settings, result["ins_drift"]["from_files"])),
@@ -117,26 +120,36 @@ def instruments_on_board(session: SessionConfig) -> list[Row]:
     return rows
 
 
-def _soundings(covariance: Sequence[Sequence[float]]) -> Row:
-    """Return the uncertainties of soundings in mm, beside what S-44 allows, and the largest share of that."""
-    table = table_of_soundings(np.array(covariance), DEPTHS_M, ANGLES_DEG)
-    largest_m = {depth: max(one.vertical_m for one in row) for depth, row in zip(DEPTHS_M, table, strict=True)}
-    shares = {
-        order.name: max(size_m / order.vertical_m(depth) for depth, size_m in largest_m.items()) for order in ORDERS
-    }
+def _soundings(covariance: Sequence[Sequence[float]], limits: VerdictLimits) -> Row:
+    """Return the uncertainties of soundings in mm, beside what S-44 allows, and the largest share of that.
+
+    Limits for a purpose end the depths and the angles: beyond them the values are not to be used.
+    """
+    order = order_of(limits)
+    orders = ORDERS if order is None else (order,)
+    depths_m = DEPTHS_M if order is None else _up_to(limits.depth_m, DEPTHS_M)
+    angles_deg = ANGLES_DEG if order is None else _up_to(limits.swath_deg, ANGLES_DEG)
+    table = table_of_soundings(np.array(covariance), depths_m, angles_deg)
+    largest_m = {depth: max(one.vertical_m for one in row) for depth, row in zip(depths_m, table, strict=True)}
+    shares = {one.name: max(size / one.vertical_m(depth) for depth, size in largest_m.items()) for one in orders}
     return {
-        "angles": ["straight down" if angle == 0 else f"at {angle:g}°" for angle in ANGLES_DEG],
-        "orders": ORDERS,
+        "angles": ["straight down" if angle == 0 else f"at {angle:g}°" for angle in angles_deg],
+        "orders": orders,
         "shares": {name: f"{100 * share:.0f}\u00a0%" for name, share in shares.items()},
         "rows": [
             {
                 "depth": f"{depth:g} m",
                 "cells": [f"{1000 * one.vertical_m:.0f} / {1000 * one.horizontal_m:.0f}" for one in row],
-                "allowed": [f"{1000 * order.vertical_m(depth):.0f}" for order in ORDERS],
+                "allowed": [f"{1000 * one.vertical_m(depth):.0f}" for one in orders],
             }
-            for depth, row in zip(DEPTHS_M, table, strict=True)
+            for depth, row in zip(depths_m, table, strict=True)
         ],
     }
+
+
+def _up_to(last: float, usual: Sequence[float]) -> tuple[float, ...]:
+    """Return the usual values below the last one, and that."""
+    return (*(value for value in usual if value < last), last)
 
 
 def _done(result: Row, sonar: bool) -> str:

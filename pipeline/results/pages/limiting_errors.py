@@ -27,7 +27,7 @@ CAUSES = {  # by the beginning of the parameters' names (ERROR_SOURCES): the sou
     "mbes_latency": ("the sonar's clock", "measure the delay of its time stamps"),
     "sound_speed_gradient": ("how the sound speed may change with depth", "take a cast through the whole depth"),
     "sound_speed": ("the sound speed", "measure it with a calibrated probe"),
-    "wet": ("how the wet faces may stand against the dry ones", "survey them with the pool filled"),
+    "wet": ("how the wet faces may stand against the dry ones", "survey them below the water"),
     "face_": ("how far single faces may stand off the design", "survey them, and give them in as_built.faces"),
     "surfaces_": ("how the target may differ from its design", "survey the target"),
     "rotation": ("the coarse mount", "sail passes that tell more, or survey the mount better"),

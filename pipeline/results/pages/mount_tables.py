@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from pipeline.config.pool import VerdictLimits
+from pipeline.config.verdict import VerdictLimits
+from pipeline.limits.verdict_limits import limits_by_setting
 from pipeline.maths.adjustment.solution import CORRELATION_LIMIT
 from pipeline.maths.mount_parameters import PARAMETERS
 
@@ -101,11 +102,12 @@ def parameter_rows(
         Names of the parameters that are not good enough.
     """
     rows = table[table["method"] == method].to_dict("records")
-    bounds = {"deg": limits.max_sigma_deg, "m": limits.max_sigma_m}
+    largest = limits_by_setting(limits)
+    keys = {name: key for name, _, key, _ in PARAMETERS}
     values = ("coarse", "total", "change", "correction", "sigma_random", "sigma_total", "low_95", "high_95")
     return [
         {"name": row["parameter"], "words": f"{row['parameter']} ({POSITIVE[row['parameter']]})"}
-        | {"limit": Quantity(bounds[row["unit"]], row["unit"])}
+        | {"limit": Quantity(largest[keys[row["parameter"]]], row["unit"])}
         | {"sigma_in": "°" if row["unit"] == "deg" else "mm", "held": row["parameter"] in held}
         | {key: Quantity(row[key], row["unit"]) for key in values}
         for row in rows

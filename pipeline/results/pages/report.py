@@ -32,7 +32,7 @@ from pipeline.gps_time import utc_text
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.maths.target.family_words import families_in_words
 from pipeline.report.as_built import design_shape
-from pipeline.report.reason_codes import verdict_in_words
+from pipeline.report.reason_codes import verdict_of
 from pipeline.report.sigma_sources import contributions, laser_correlates
 from pipeline.results.pages.certificate import certificate_values
 from pipeline.results.pages.currency import page_digest
@@ -119,14 +119,14 @@ def _result_values(
     passes, calibrations = tables.table(PASSES), tables.table(CALIBRATION)
     planes = [] if laser else plane_agreement_rows(tables)
     methods = [method for method in METHODS if method in result["methods"]]
-    rows = parameter_rows(calibrations, result["result"], settings.pool.verdict, held)
+    rows = parameter_rows(calibrations, result["result"], settings.limits, held)
     correlates = laser_correlates(settings.session.calibrated, settings.session.laser.mount_covariance)
     sources = contributions(tables.table(FREED), result["methods"]["adjustment"], correlates)
     return {
         "certificate": certificate_values(tables, manifests, result, settings, rows),
         "limiting": list(limiting_sentences(sources, rows)),
         "held": [] if result["reasons"] else list(held),
-        "verdict": verdict_in_words(result["verdict"], held),
+        "verdict": verdict_of(result),
         "run": tables.run.absolute().name,
         "date": str(passes["start_ns"].map(utc_text).min())[:10] if len(passes) else "",
         "parameters": rows,

@@ -1,0 +1,1 @@
+"""The limits by which a calibration is judged."""
