@@ -15,7 +15,7 @@ from pipeline.checking.findings import Finding
 from pipeline.checking.ins_quality import InsQuality, assess_ins_quality, quality_findings
 from pipeline.checking.latency import latency_findings
 from pipeline.checking.point_samples import rows_with_pose, sample_points, sampled_rows
-from pipeline.checking.track import InsTrack, Leg, frame_of, joined, track_of
+from pipeline.checking.track import InsTrack, Leg, frame_of, joined, sees_port, track_of
 from pipeline.checking.trial_calibration import Calibrate, TrialCalibration
 from pipeline.checking.trial_findings import pose_findings, sign_findings
 from pipeline.config.pool import Ingest, PoolConfig
@@ -126,9 +126,9 @@ def _check_at_target(session: _Session, epochs: dict[str, Times], unusable: set[
         return away
     frame = frame_of(ins, pool.target_place)
     if frame is None:
-        words = "target.azimuth_deg is not given, and the boat never has target.origin within 20 m to starboard"
+        words = "target.azimuth_deg is not given, and the boat never has target.origin within 20 m abeam"
         return replace(away, findings=(Finding("side", f"{words}; give azimuth_deg, or check target.origin"),))
-    track = track_of(ins, frame, model, files, pool.ingest)
+    track = track_of(ins, frame, model, files, pool.ingest, sees_port(session.settings))
     findings = list(track_checks.sailing_findings(track, pool.target_place))
     usable = [sensor for sensor in ("laser", "mbes") if sensor in epochs and sensor not in unusable]
     of_points: list[Finding] = []

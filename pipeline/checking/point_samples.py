@@ -49,7 +49,7 @@ class PointSample:
         return self._rows(track.trajectory.covers(self.t_ns, NS))
 
     def in_good_legs(self, track: InsTrack) -> "PointSample":
-        """Return the points of the good legs: the boat is in front of the target and has it to starboard."""
+        """Return the points of the good legs: the boat is in front of the target, on the side to which sensors look."""
         rows = np.zeros(len(self.t_ns), dtype=bool)
         for leg in track.legs:
             if leg.good:

@@ -10,6 +10,7 @@ from pipeline.checking.expected_soundings import USUAL
 from pipeline.checking.file_lines import gaps_line, left_out_lines
 from pipeline.checking.file_survey import SurveyedFile
 from pipeline.checking.ins_quality import InsQuality
+from pipeline.checking.track import Leg
 from pipeline.gps_time import utc_text
 from pipeline.maths.target.family_words import families_in_words
 from pipeline.maths.target.model import names_in_order
@@ -63,12 +64,19 @@ def _pass_lines(examined: SessionCheck) -> list[str]:
             f"{leg.speed_m_s:.2f} m/s",
             f"{leg.ran['laser']:.0%}",
             f"{leg.ran['mbes']:.0%}",
-            "" if leg.good else "the wall is not to starboard",
+            _why_not(leg),
         )
         for number, leg in enumerate(examined.legs)
     ]
     heads = ("pass", "from (UTC)", "seconds", "distance", "speed", "laser", "sonar")
     return [*text_table("<6<22>8>10>10>8>8  <1", heads, rows), *wrapped(OF_PASSES, following="")]
+
+
+def _why_not(leg: Leg) -> str:
+    """Return why a pass does not count; empty if it does."""
+    if leg.good:
+        return ""
+    return "behind the target" if leg.distance_m <= 0 else "target to port, where the sonar does not look"
 
 
 def _quality_lines(found: InsQuality) -> list[str]:

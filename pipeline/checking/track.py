@@ -8,16 +8,19 @@ from numpy.typing import NDArray
 
 from pipeline.checking.file_survey import Columns, SurveyedFile
 from pipeline.config.pool import Ingest, TargetPlace
+from pipeline.config.session import SessionConfig
 from pipeline.gps_time import NS
 from pipeline.maths.geometry.geodesy import PoolFrame, ecef_from_geodetic
 from pipeline.maths.geometry.passes import abeam, estimate_azimuth, find_passes
 from pipeline.maths.geometry.trajectory import GeodeticPoses, Trajectory, poses_in_pool
 from pipeline.maths.target.model import TargetModel
+from pipeline.mount import mount_of
 
 Array = NDArray[np.float64]
 Times = NDArray[np.int64]
 NEAR_M = 30.0  # largest distance of a leg from the target's front
 SHORTEST_M = 1.0  # shortest leg along the target
+STARBOARD_ONLY = 0.5  # the part to starboard of a sonar's line of sight, from which on it hears nothing to port
 BIN_NS = NS
 MOST_RECORDS = 400_000  # INS records; twice as many or more are thinned
 NAMES = ("latitude_rad", "longitude_rad", "height_m", "roll_rad", "pitch_rad", "azimuth_rad")
@@ -45,6 +48,8 @@ class Leg:
         By sensor the share of the leg's time in which it ran.
     astern : bool
         Whether the boat moves against its heading.
+    sees_port : bool
+        Whether the sensors may see a target to port.
     """
 
     start_ns: int
@@ -56,11 +61,12 @@ class Leg:
     starboard: bool
     ran: Mapping[str, float]
     astern: bool = False
+    sees_port: bool = False
 
     @property
     def good(self) -> bool:
-        """Whether the boat is in front of the target and has it to starboard, as a session requires."""
-        return self.starboard and self.distance_m > 0
+        """Whether the boat is in front of the target and has it on a side to which the sensors look."""
+        return (self.starboard or self.sees_port) and self.distance_m > 0
 
 
 @dataclass(frozen=True)
@@ -91,8 +97,25 @@ def frame_of(ins: Columns, place: TargetPlace) -> PoolFrame | None:
     return None if azimuth is None else PoolFrame.at(*at, azimuth)
 
 
+def sees_port(session: SessionConfig) -> bool:
+    """Return whether the sonar, by its coarse mount, hears a target to port: its head looks down, or to port.
+
+    A laser may look to any side: its files do not say. A head that should look to starboard and has the wrong sign of
+    roll is found by the points.
+    """
+    if session.mbes is None:
+        return True
+    looks = -mount_of(session.mbes.mount).R_body_from_sensor[:, 2]  # of the head at roll 0: straight down
+    return bool(looks[0] < STARBOARD_ONLY)
+
+
 def track_of(
-    ins: Columns, frame: PoolFrame, model: TargetModel, files: Sequence[SurveyedFile], settings: Ingest
+    ins: Columns,
+    frame: PoolFrame,
+    model: TargetModel,
+    files: Sequence[SurveyedFile],
+    settings: Ingest,
+    to_port: bool = False,
 ) -> InsTrack:
     """Return the INS's track and its legs past the target.
 
@@ -108,6 +131,8 @@ def track_of(
         The session's files. Their times show which sensors ran in each leg.
     settings : Ingest
         Limits that end a pass.
+    to_port : bool
+        Whether the sensors may see a target to port.
     """
     positions, R = poses_in_pool(frame, GeodeticPoses(**{name: ins[name] for name in NAMES}))
     t_ns = ins["t_ns"]
@@ -120,11 +145,11 @@ def track_of(
         x, y = positions[:, 0], positions[:, 1]
         rows = np.flatnonzero((t_ns >= start) & (t_ns <= end) & (np.abs(y) <= reach) & (np.abs(x) <= NEAR_M))
         if len(rows) > 1 and np.ptp(y[rows]) >= min(SHORTEST_M, reach):
-            legs.append(_leg(t_ns[rows], positions[rows], R[rows], files))
+            legs.append(_leg(t_ns[rows], positions[rows], R[rows], files, to_port))
     return InsTrack(frame, Trajectory.build(t_ns, positions, R), tuple(legs))
 
 
-def _leg(t_ns: Times, positions: Array, R: Array, files: Sequence[SurveyedFile]) -> Leg:
+def _leg(t_ns: Times, positions: Array, R: Array, files: Sequence[SurveyedFile], to_port: bool) -> Leg:
     start, end = int(t_ns[0]), int(t_ns[-1])
     away = float(np.median(positions[:, 0]))
     ahead = R[:, :2, 1]  # level part of the body's y axis
@@ -142,24 +167,28 @@ def _leg(t_ns: Times, positions: Array, R: Array, files: Sequence[SurveyedFile])
         starboard=forward == (away < 0),
         ran={sensor: _ran(start, end, of_sensor) for sensor, of_sensor in by_sensor.items()},
         astern=forward != (run > 0),
+        sees_port=to_port,
     )
 
 
 def askew_deg(track: InsTrack) -> float | None:
     """Return the clockwise angle (degrees, within ±180) from the target's +y to the direction in which the boat sailed.
 
-    Only records count in which target.origin is near and abeam to starboard. The direction is the mean heading or the
-    course made good, whichever is nearer to +y. The angle is 0 if the two lie on different sides of +y, and None if no
-    record counts.
+    Only records count in which target.origin is near and abeam to starboard; if there is none, those to port, and
+    against +y. The direction is the mean heading or the course made good, whichever is nearer to +y. The angle is 0 if
+    the two lie on different sides of +y, and None if no record counts.
     """
     x, y = track.trajectory.positions_m[:, :2].T
     ahead = track.trajectory.R_frame_from_body[:, :2, 1]
-    near = abeam(x, y, np.arctan2(ahead[:, 0], ahead[:, 1]))
+    heading = np.arctan2(ahead[:, 0], ahead[:, 1])
+    starboard = abeam(x, y, heading)
+    near, sense = (starboard, 1.0) if starboard.any() else (abeam(x, y, heading, to_port=True), -1.0)
     if not near.any():
         return None
     steps = np.flatnonzero(near[1:] & near[:-1])
-    headed = float(np.arctan2(*ahead[near].sum(axis=0)))
-    went = float(np.arctan2((x[steps + 1] - x[steps]).sum(), (y[steps + 1] - y[steps]).sum()))
+    headed = float(np.arctan2(*(sense * ahead[near].sum(axis=0))))
+    gone = sense * np.array([(along[steps + 1] - along[steps]).sum() for along in (x, y)])
+    went = float(np.arctan2(*gone))
     return float(np.degrees(min(headed, went, key=abs))) if headed * went > 0 else 0.0
 
 

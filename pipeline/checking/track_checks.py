@@ -98,11 +98,11 @@ def sailing_findings(track: InsTrack, place: TargetPlace) -> Iterator[Finding]:
         yield Finding("side", f"{words}, or check target.origin")
     elif not any(leg.good for leg in track.legs):
         astern = [leg for leg in track.legs if leg.astern]
-        words = f"{legs} the boat sails with the target to port"
+        words = f"{legs} the boat sails with the target to port, where the sonar by mbes.mount does not look"
         if len(astern) > len(track.legs) / 2:
             yield Finding("side", f"{words}, stern first by its heading: is the INS's heading turned by 180°?")
         else:
-            yield Finding("side", f"{words}: sail the other way, with the target's front to starboard")
+            yield Finding("side", f"{words}: sail the other way, or check mbes.mount.roll_deg")
     elif askew := azimuth_remedy(track, place):
         yield Finding("azimuth", f"the boat does not sail along the target: {askew}")
     distances = [leg.distance_m for leg in sounded if leg.good]
@@ -134,8 +134,9 @@ def azimuth_remedy(track: InsTrack, place: TargetPlace) -> str:
         return ""
     sailed = round(place.azimuth_deg + turn) % 360
     return (
-        f"it heads {sailed}° with target.origin to starboard, but target.azimuth_deg is {place.azimuth_deg:g} (the "
-        f"direction of the target's +y, along which it is sailed): write {sailed}, or check target.origin"
+        f"it heads {sailed}° with target.origin to starboard (the other way with it to port), but target.azimuth_deg "
+        f"is {place.azimuth_deg:g} (the direction of the target's +y, along which it is sailed): write {sailed}, or "
+        "check target.origin"
     )
 
 

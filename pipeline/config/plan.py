@@ -1,6 +1,6 @@
 """PLAN.yaml: planned passes, and the figures of the instruments that session.yaml does not have."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -41,12 +41,18 @@ class Unrest(Model):
 
 
 class Pass(Model):
-    """One pass along the wall."""
+    """One pass along the wall: toward its +y, with the wall to starboard, or back, with the wall to port."""
 
     distance_m: Annotated[float, Field(ge=0.5, le=100)]  # distance of the INS from the wall
+    course: Literal["along", "back"] = "along"
     speed_m_s: Annotated[float, Field(ge=0.01, le=10)] = 0.4
     heading_swing_deg: Annotated[float, Field(ge=0, le=45)] = 1.5  # amplitude
     half_length_m: Annotated[float, Field(ge=0.1, le=100)] | None = None  # null: to 2 m beyond the target
+
+    @property
+    def where(self) -> str:
+        """The pass in a few words: its distance, and whether it leads back."""
+        return f"{self.distance_m:.1f} m" if self.course == "along" else f"{self.distance_m:.1f} m back"
 
     def seconds(self, half_length_m: float) -> float:
         """Return the time of the pass in seconds; ``half_length_m`` is used if the pass has none of its own."""

@@ -13,7 +13,7 @@ from pipeline.maths.geometry.geodesy import PoolFrame, geodetic_from_ecef
 from pipeline.maths.surfaces.flatness import plane_axes
 from pipeline.maths.surfaces.outline import bent, clipped, convex_hull
 from pipeline.maths.target.face import plane_of
-from pipeline.maths.target.outlines import AWAY
+from pipeline.maths.target.outlines import looks_away
 
 Array = NDArray[np.float64]
 UPRIGHT_DEG = 20.0  # a wall may lean by this; what leans more is a slope
@@ -90,7 +90,7 @@ def found_place(planes: Sequence[DryPlane], level_m: float, frame: PoolFrame, de
         if not plane.refused:
             outline = plane.corners_m(_continued(plane, level_m, depth_m))
             corners = target.points_from_ecef(frame.points_to_ecef(outline))
-            if plane_of(corners)[0][0] > AWAY:
+            if looks_away(corners, plane_of(corners)[0]):
                 plane = replace(plane, refused="looks away from the passes beside the largest wall")
             else:
                 faces.append((plane, np.round(corners, DIGITS)))

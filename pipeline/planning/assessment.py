@@ -192,7 +192,7 @@ def _blind_passes(accuracy: Accuracy) -> list[str]:
     """Return sentences that name the passes in which a sensor does not see the target."""
     sentences = []
     for sensor, name in (("laser", "laser"), ("mbes", "sonar")):
-        far = [f"{planned.distance_m:g} m" for planned, _, points in accuracy.each() if not points[sensor].any()]
+        far = [planned.where for planned, _, points in accuracy.each() if not points[sensor].any()]
         if far:
             sentences.append(f"the {name} sees nothing of the target from {', '.join(dict.fromkeys(far))}")
     return sentences

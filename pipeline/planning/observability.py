@@ -17,6 +17,7 @@ NEAR_M = 1.5  # distances that differ by less count as one
 WANTED_DEG, WANTED_M = 0.025, 0.004  # a larger random sigma is worth another pass
 WANTED = np.repeat([np.radians(WANTED_DEG), WANTED_M], 3)
 TRIED_M = (3.0, 4.0, 5.0, 6.0, 8.0, 10.0)  # distances of passes that might help
+STRAIGHT_DEG = 5.0  # largest swing of the heading on a straight pass; a boat that turns swings by more
 TWICE = 2  # number of further passes at such a distance
 VAGUE = 1.0  # rad or m: prior sigma of every parameter
 SIDES = {"P1": "the faces on the -y side (P1)", "P3": "the faces on the +y side (P3)", "P2": "the wall (P2)"}
@@ -143,9 +144,10 @@ def _remedy(setting: PredictionSetting, coverage: Coverage, determined: _Determi
     It names the sigma of one mount ``parameter`` without and with them. It is empty if they do not halve this sigma.
     """
     before = float(determined.sigmas()[parameter])
+    swing_deg = min(coverage.heading_swing_deg, STRAIGHT_DEG)  # what is advised is a straight pass
     best: tuple[float, float, float] | None = None
     for distance in TRIED_M:
-        planned = Pass(distance_m=distance, speed_m_s=coverage.speed_m_s, heading_swing_deg=coverage.heading_swing_deg)
+        planned = Pass(distance_m=distance, speed_m_s=coverage.speed_m_s, heading_swing_deg=swing_deg)
         after = determined.with_passes(TWICE * predict(setting, [planned], phases=1).normal)
         if after.deficiency:
             continue

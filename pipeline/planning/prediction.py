@@ -174,7 +174,7 @@ def planned_track(setting: PredictionSetting, planned: Pass, number: int) -> Arr
 
 
 def _trajectory(setting: PredictionSetting, planned: Pass, seconds: float, number: int) -> Trajectory:
-    """Return poses along +y past the target at x = -distance, with waves of golden-ratio phases on all except y."""
+    """Return poses along ±y past the target at x = -distance, with waves of golden-ratio phases on all except y."""
     plan, unrest = setting.plan, setting.plan.unrest
     t = np.arange(0.0, seconds + 1 / plan.ins_rate_hz, 1 / plan.ins_rate_hz)
     half = planned.half_length_m or setting.half_length_m
@@ -185,11 +185,12 @@ def _trajectory(setting: PredictionSetting, planned: Pass, seconds: float, numbe
 
     period = unrest.period_s
     x = wave(unrest.sway_m, 2 * period, 0) - planned.distance_m
-    y = planned.speed_m_s * t - half
+    sense = 1.0 if planned.course == "along" else -1.0
+    y = sense * (planned.speed_m_s * t - half)
     z = wave(unrest.heave_m, 0.9 * period, 1) + setting.model.water_level_m + plan.ins_height_m
     roll = wave(np.radians(unrest.roll_deg), period, 2)
     pitch = wave(np.radians(unrest.pitch_deg), 0.85 * period, 3)
-    heading = wave(np.radians(planned.heading_swing_deg), 2.7 * period, 4)
+    heading = wave(np.radians(planned.heading_swing_deg), 2.7 * period, 4) + (0.0 if sense > 0 else np.pi)
     attitude = rotation_from_attitude(roll, pitch, heading)
     return Trajectory.build(np.round(t * NS).astype(np.int64), np.column_stack([x, y, z]), attitude)
 

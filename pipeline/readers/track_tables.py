@@ -55,7 +55,7 @@ def pool_frame_table(trajectory: pd.DataFrame, target: TargetPlace) -> tuple[pd.
         estimate = estimate_azimuth(points[:, 0], points[:, 1], trajectory["azimuth_rad"].to_numpy())
         if estimate is None:
             raise RawDataError(
-                "target.azimuth_deg is not given and the boat never had target.origin within 20 m to starboard; "
+                "target.azimuth_deg is not given and the boat never had target.origin within 20 m abeam; "
                 "give azimuth_deg, or check target.origin"
             )
         azimuth = float(np.degrees(estimate))

@@ -22,9 +22,9 @@ def unsounded_passes_table(
 ) -> pd.DataFrame:
     """Return the table ``unsounded_passes``.
 
-    The boat passes the target where it crosses y = 0 toward +y, in front of the target (-30 m < x < 0; pool frame).
-    It is abeam of the target while |y| ≤ |x|. Such a stretch counts if the laser ran in it, and if less than a fifth of
-    its INS records lie in passes.
+    The boat passes the target where it crosses y = 0 in front of the target (-30 m < x < 0; pool frame), in a direction
+    in which it sails in passes, too: it may come back with the sonar off. It is abeam of the target while |y| ≤ |x|.
+    Such a stretch counts if the laser ran in it, and if less than a fifth of its INS records lie in passes.
 
     Parameters
     ----------
@@ -46,10 +46,12 @@ def unsounded_passes_table(
     x, y = frame.points_from_ecef(ecef_from_geodetic(*geodetic))[:, :2].T
     abeam = (x < 0) & (x > -FARTHEST_M) & (np.abs(y) <= np.abs(x))
     sounded = pass_of(t_ns, passes["start_ns"].to_numpy(), passes["end_ns"].to_numpy()) >= 0
+    directions = {float(sense) for sense in np.sign(passes["length_m"])}
     rows = []
     for start, end in find_passes(t_ns, y, laser_ns, max_gap_ns, reversal_m):
         here = np.flatnonzero(abeam & (t_ns >= start) & (t_ns <= end))
-        if len(here) and y[here[0]] < 0 < y[here[-1]] and sounded[here].mean() < SOUNDED:
+        crosses = len(here) > 0 and y[here[0]] * y[here[-1]] < 0 and np.sign(y[here[-1]]) in directions
+        if crosses and sounded[here].mean() < SOUNDED:
             times = {"start_ns": t_ns[here[0]], "end_ns": t_ns[here[-1]]}
             rows.append(times | {"distance_m": float(np.median(-x[here]))})
     return pd.DataFrame(rows, columns=[column.name for column in UNSOUNDED_PASSES.columns])

@@ -73,8 +73,9 @@ REMEDIES: dict[Code, Remedy] = {
     Code.SIGMA_ABOVE_LIMIT: Remedy(
         "Weak geometry, noise, or a systematic error whose sigma in the settings is large. The reason names the two "
         "largest sources.",
-        "Work on the largest source: a cast for the sound speed, a survey of the wet faces, a better laser mount, more "
-        "passes at other distances. poolcal plan tells what passes would give.",
+        "Work on the largest source: a cast for the sound speed, a survey of the wet faces (or passes both ways, if "
+        "the sensors see both sides), a better laser mount, more passes at other distances. poolcal plan tells what "
+        "passes would give.",
     ),
     Code.SOUNDINGS_ABOVE_LIMIT: Remedy(
         "Each value is within its own limit, but all together make soundings more uncertain than verdict.purpose "

@@ -1,4 +1,4 @@
-"""The vessel's true movement in the target frame: straight passes along +y, with waves on every coordinate."""
+"""The vessel's true movement in the target frame: straight passes or circles, with waves on every coordinate."""
 
 from dataclasses import dataclass
 from datetime import datetime
@@ -47,11 +47,15 @@ class Movement:
         self.amplitudes = np.where(np.arange(6) < 3, amplitudes, np.radians(amplitudes))
         self.periods_s = np.array([getattr(motion, name).period_s for name in WAVES])
         self.margin_ns, gap_ns = round(track.margin_s * NS), round(track.gap_s * NS)
-        length_ns = round(2 * self.half_length_m / self.speed_m_s * NS)
         passes = range(len(track.distances_m))
-        first_ns = session_start_ns(scenario) + self.margin_ns
-        self.starts_ns = [first_ns + k * (length_ns + 2 * self.margin_ns + gap_ns) for k in passes]
-        self.ends_ns = [start + length_ns for start in self.starts_ns]
+        self.courses = [track.courses[k % len(track.courses)] for k in passes]
+        self.radius_m = track.circle_radius_m
+        ways_m = {"circle": 2 * float(np.pi) * self.radius_m}
+        straight_m = 2 * self.half_length_m
+        lengths_ns = [round(ways_m.get(course, straight_m) / self.speed_m_s * NS) for course in self.courses]
+        first_ns, starts = session_start_ns(scenario) + self.margin_ns, np.cumsum([0, *lengths_ns[:-1]]).tolist()
+        self.starts_ns = [first_ns + starts[k] + k * (2 * self.margin_ns + gap_ns) for k in passes]
+        self.ends_ns = [start + length_ns for start, length_ns in zip(self.starts_ns, lengths_ns, strict=True)]
         self.phases_rad = [generator(seed, "motion", k).uniform(0, 2 * np.pi, (6, 2)) for k in passes]
 
     @property
@@ -100,7 +104,7 @@ class Movement:
         begin, end = self.ends_ns[k] + self.margin_ns, self.starts_ns[k + 1] - self.margin_ns
         u = np.clip((t_ns - begin) / max(end - begin, 1), 0.0, 1.0)
         share = u**3 * (10 - 15 * u + 6 * u**2)
-        states = (1 - share) * states + share * self._pass_states(k + 1, t_ns)
+        states = np.asarray((1 - share) * states + share * self._pass_states(k + 1, t_ns))
         states[5] -= 2 * np.pi * share  # a full circle to port: the starboard side turns away from the target
         return states
 
@@ -113,10 +117,20 @@ class Movement:
             wave = 0.75 * np.sin(turn + phases[row, 0]) + 0.25 * np.sin(turn / SECOND_PERIOD + phases[row, 1])
             states[row] = self.amplitudes[row] * wave
         states[0] -= self.distances_m[k]
-        states[1] += self.speed_m_s * seconds - self.half_length_m
         states[2] += self.height_m
         states[3:5] += self.offset_rad[:, None]
         states[5] += self.azimuth_rad
+        way_m = self.speed_m_s * seconds
+        if self.courses[k] == "circle":
+            turned = way_m / self.radius_m  # heading first into the target, then farther to starboard
+            states[0] += self.radius_m * np.sin(turned)
+            states[1] += self.radius_m * np.cos(turned)
+            states[5] += np.pi / 2 + turned
+        elif self.courses[k] == "back":
+            states[1] += self.half_length_m - way_m
+            states[5] += np.pi
+        else:
+            states[1] += way_m - self.half_length_m
         return states
 
 

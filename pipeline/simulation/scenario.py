@@ -1,8 +1,9 @@
 """Scenarios: the settings of a simulated pool session. The defaults of all keys are "the default scenario"."""
 
 from datetime import datetime
+from math import pi
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -49,11 +50,19 @@ class Motion(Model):
     heading_offset_deg: Angle = 0.0  # heading minus the target's azimuth
 
 
+Course = Literal["along", "back", "circle"]
+
+
 class TrackScenario(Model):
-    """Passes along the target, in the direction of its +y axis."""
+    """Passes along the target. ``courses`` are taken in turn: toward its +y axis, toward -y, or once round a circle.
+
+    The circle is sailed to starboard. Its centre lies in front of the target, at the pass's distance from it.
+    """
 
     distances_m: Annotated[tuple[Length, ...], Field(min_length=1, max_length=100)] = (4.0, 8.0, 5.0, 7.0)  # to wall
     speed_m_s: Annotated[float, Field(gt=0.001, le=20)] = 0.4
+    courses: Annotated[tuple[Course, ...], Field(min_length=1, max_length=100)] = ("along",)
+    circle_radius_m: Annotated[float, Field(ge=0.05, le=100)] = 1.0
     half_length_m: Length | None = None  # from -y to +y of this; null: 2 m beyond the target
     ins_height_m: Lever = 1.3  # height of the INS above the water
     margin_s: Annotated[float, Field(ge=0, le=3600)] = 3.0  # time of the INS's log before and after each pass
@@ -88,7 +97,8 @@ class Scenario(Model):
                 f"track.ins_height_m = {height_m} puts the sonar {height_m + self.mbes.mount.z_m:.2f} m and the laser "
                 f"{height_m + self.laser.mount.z_m:.2f} m above the water: it must be 0.2 m below, and 0.2 m above"
             )
-        if 2 * self.half_length_m / self.track.speed_m_s < 1.0:
+        way_m = min(2 * self.half_length_m, 2 * pi * self.track.circle_radius_m)
+        if way_m / self.track.speed_m_s < 1.0:
             raise ValueError(f"track.speed_m_s = {self.track.speed_m_s}: a pass must last a second or more")
         return self
 

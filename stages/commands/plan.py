@@ -84,7 +84,7 @@ def _chosen(answer: PlanAssessment, better: Accuracy, limits: VerdictLimits) -> 
         number, longest, sums = alike.get(one, (0, 0.0, dict.fromkeys(points, np.zeros(1))))
         alike[one] = number + 1, max(longest, seconds), {name: sums[name] + points[name] for name in points}
     rows = [(number, one, seconds, points) for one, (number, seconds, points) in alike.items()]
-    each = ", ".join(f"{number} x {one.distance_m:.1f} m" for number, one, *_ in rows)
+    each = ", ".join(f"{number} x {one.where}" for number, one, *_ in rows)
     lines = [f"Chosen from the candidates, in the time there is: {each}, in any order."]
     lines += [*_passes(answer.setting, rows), *_sigmas(answer.setting, better, limits)]
     if answer.given.solution.deficiency or better.solution.deficiency:
@@ -111,11 +111,11 @@ def _passes(setting: PredictionSetting, rows: list[tuple[int, Pass, float, dict[
         by_family = dict.fromkeys(families, 0.0)
         for face, count in zip(setting.model.faces, points["mbes"], strict=True):
             by_family[face.family] += float(count)
-        sailed = (f"{one.distance_m:.1f} m", f"{one.speed_m_s:.2f} m/s", f"{one.heading_swing_deg:.1f}°")
+        sailed = (one.where, f"{one.speed_m_s:.2f} m/s", f"{one.heading_swing_deg:.1f}°")
         counts = [f"{by_family[family]:,.0f}" for family in families]
         cells.append((str(number), *sailed, f"{seconds:.0f} s", "", *counts, f"{points['laser'].sum():,.0f}"))
     heads = ("passes", "distance", "speed", "swing", "time", "soundings on", *families, "laser points")
-    return text_table(f"  >6>10>10>8>8>15{'  >7' * len(families)}>15", heads, cells)
+    return text_table(f"  >6>12>10>8>8>15{'  >7' * len(families)}>15", heads, cells)
 
 
 def _sigmas(setting: PredictionSetting, accuracy: Accuracy, limits: VerdictLimits) -> list[str]:

@@ -191,7 +191,7 @@ def test_a_target_to_port_is_not_one_from_behind(blocks: Looked) -> None:
     assert "in all 2 passes the boat sails behind the target" in behind
     assert "turn target.azimuth_deg by 180° (180 in place of 0)" in behind
     port = said(starboard=False)
-    assert "with the target to port: sail the other way" in port
+    assert "with the target to port, where the sonar by mbes.mount does not look: sail the other way" in port
     assert "azimuth" not in port
     assert "is the INS's heading turned by 180°?" in said(starboard=False, astern=True)
 

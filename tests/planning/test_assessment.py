@@ -165,7 +165,7 @@ def test_within_a_budget_the_better_list_is_chosen(configs: tuple[PoolConfig, Se
 def test_out_of_sight_there_is_no_result(configs: tuple[PoolConfig, SessionConfig]) -> None:
     answer = assessment.assess_plan(plan_of(60.0, mbes={"max_range_m": 15.0}), *configs)
     assert answer.given.solution.deficiency > 0
-    assert answer.gaps[:2] == [f"the {sensor} sees nothing of the target from 60 m" for sensor in ("laser", "sonar")]
+    assert answer.gaps[:2] == [f"the {sensor} sees nothing of the target from 60.0 m" for sensor in ("laser", "sonar")]
     assert not any("alone has soundings" in gap for gap in answer.gaps)
     assert "left open: no result" in table(answer, configs[0].verdict)
     assert plan_document(answer)["given"]["sigma_mount"] is None

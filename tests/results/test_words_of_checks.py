@@ -134,6 +134,15 @@ def test_a_face_that_leans_is_told_to() -> None:
     assert words.endswith("overhang: 2 faces turned 45° astern (-y), looking down by 45°")
 
 
+def test_a_face_across_the_boat_is_told_to_be() -> None:
+    """The walls of a lock: one looks back at the boat, one in its corner looks back and ahead, toward +y."""
+    wall = Family("left", np.array([1.0, 0.0, 0.0]), 0.0, (0,), True)
+    corner = Family("corner", np.array([np.sqrt(0.5), np.sqrt(0.5), 0.0]), 0.0, (1,), True)
+    words = families_in_words(TargetModel((), (wall, corner), (), 0.0, None))
+    assert "left: 1 face across the boat, straight towards it; " in words
+    assert words.endswith("corner: 1 face across the boat, turned 45° ahead (+y)")
+
+
 # --- the screen ------------------------------------------------------------------------------------------------------
 def test_sentences_keep_within_the_screen(monkeypatch: pytest.MonkeyPatch) -> None:
     words = " ".join(f"word{number}" for number in range(60)) + " " + "x" * 130 + " end"

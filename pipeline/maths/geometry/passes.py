@@ -127,8 +127,10 @@ def pass_of(t_ns: Times, starts_ns: Times, ends_ns: Times) -> NDArray[np.int16]:
     return np.where(inside, index, -1).astype(np.int16)
 
 
-def abeam(east_m: Array, north_m: Array, azimuth_rad: Array, within_m: float = 20.0) -> NDArray[np.bool_]:
-    """Return a mask (n,): true where the target lies to starboard, within 45° of abeam, and near.
+def abeam(
+    east_m: Array, north_m: Array, azimuth_rad: Array, within_m: float = 20.0, to_port: bool = False
+) -> NDArray[np.bool_]:
+    """Return a mask (n,): true where the target lies to starboard (or to port), within 45° of abeam, and near.
 
     Near means: less than ``within_m`` away across the heading.
 
@@ -140,14 +142,19 @@ def abeam(east_m: Array, north_m: Array, azimuth_rad: Array, within_m: float = 2
         Heading (n,), clockwise from true north.
     within_m
         Largest distance across the heading.
+    to_port
+        Whether the target is to lie to port.
     """
     starboard = -(east_m * np.cos(azimuth_rad) - north_m * np.sin(azimuth_rad))
     ahead = -(east_m * np.sin(azimuth_rad) + north_m * np.cos(azimuth_rad))
-    return np.asarray((starboard > 0) & (starboard < within_m) & (np.abs(ahead) < starboard))
+    across = -starboard if to_port else starboard
+    return np.asarray((across > 0) & (across < within_m) & (np.abs(ahead) < across))
 
 
 def estimate_azimuth(east_m: Array, north_m: Array, azimuth_rad: Array, within_m: float = 20.0) -> float | None:
-    """Return the direction (rad) of the track past the target: the mean heading while the target is :func:`abeam`.
+    """Return the direction (rad) of the target's +y axis: the mean heading while the target is :func:`abeam`.
+
+    That is while it lies to starboard; if it never does, the opposite of the mean heading while it lies to port.
 
     Parameters
     ----------
@@ -160,9 +167,11 @@ def estimate_azimuth(east_m: Array, north_m: Array, azimuth_rad: Array, within_m
 
     Returns
     -------
-    The direction, clockwise from true north; None if the target was never abeam to starboard.
+    The direction, clockwise from true north; None if the target was never abeam.
     """
-    near = abeam(east_m, north_m, azimuth_rad, within_m)
-    if not near.any():
-        return None
-    return float(np.arctan2(np.sin(azimuth_rad[near]).mean(), np.cos(azimuth_rad[near]).mean()))
+    for to_port in (False, True):
+        near = abeam(east_m, north_m, azimuth_rad, within_m, to_port)
+        if near.any():
+            along = azimuth_rad[near] + np.pi * to_port
+            return float(np.arctan2(np.sin(along).mean(), np.cos(along).mean()))
+    return None

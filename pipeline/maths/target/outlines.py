@@ -21,6 +21,7 @@ FLAT_M = 0.01  # corners farther than this off their own plane make no plane
 SAME_PLANE_M = 0.02  # faces of one plane may stand this far apart by their corners
 PARALLEL_DEG = 0.5  # parallel faces may be turned by this by their corners
 AWAY = 0.1  # largest x of an upright face's normal: the boat passes at x < 0
+ACROSS_M = 3.0  # a face that stands all of this before x = 0 may look toward +x: the boat passes between
 SMALLEST_M = 0.05  # a face smaller than the square of this side is refused
 
 
@@ -131,12 +132,26 @@ def _plane(outline: Outline) -> tuple[Array, float]:
     turns = np.cross(after - vertices, np.roll(after, -1, axis=0) - after) @ normal
     if np.any(turns <= 0):
         raise ConfigError(f"{where}: make no convex polygon; split the face into convex ones, tied by same_plane")
-    if abs(normal[2]) <= HORIZONTAL_COSINE and normal[0] > AWAY:
+    if looks_away(vertices, normal):
         raise ConfigError(
             f"{where}: the face looks away from the boat, which passes at x < 0; give its corners counter-clockwise as "
             "seen from the boat"
         )
     return normal, distance_m
+
+
+def looks_away(vertices_m: Array, normal: Array) -> bool:
+    """Return whether a boat at x < 0 cannot see an upright face; it may pass before one that stands across from x = 0.
+
+    Parameters
+    ----------
+    vertices_m
+        Corners (k, 3), target frame.
+    normal
+        Outward normal (3,).
+    """
+    upright = abs(normal[2]) <= HORIZONTAL_COSINE
+    return bool(upright and normal[0] > AWAY and vertices_m[:, 0].max() > -ACROSS_M)
 
 
 def _check(relation: Relation, planes: Mapping[str, tuple[Array, float]]) -> None:

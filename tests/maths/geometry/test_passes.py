@@ -69,4 +69,6 @@ def test_the_track_is_taken_where_the_target_lies_to_starboard(azimuth_deg):
     east, north = np.concatenate([there, back]).T
     estimate = estimate_azimuth(east, north, heading)
     assert np.degrees(np.angle(np.exp(1j * (estimate - a)))) == pytest.approx(0, abs=1e-9)
-    assert estimate_azimuth(east[200:], north[200:], heading[200:]) is None
+    port_alone = estimate_azimuth(east[200:], north[200:], heading[200:])  # its heading is the other way
+    assert np.degrees(np.angle(np.exp(1j * (port_alone - a)))) == pytest.approx(0, abs=1e-9)
+    assert estimate_azimuth(east - 100 * starboard[0], north - 100 * starboard[1], heading) is None

@@ -110,3 +110,14 @@ def test_what_cannot_be_meant_is_one_line(outlines, relations, words: str) -> No
     with pytest.raises(ConfigError, match=r".") as refused:
         build_target(outlines, relations, 0.0, None)
     assert words in str(refused.value)
+
+
+@pytest.mark.parametrize(("back_m", "refused"), [(3.01, False), (2.99, True)])
+def test_a_face_across_the_boat_may_look_back_at_it(back_m: float, refused: bool) -> None:
+    """The other wall of a lock looks toward +x; nearer than 3 m no boat passes between: its corners are clockwise."""
+    across = Outline("across", [(x - back_m, y, z) for x, y, z in WALL.corners[::-1]])
+    if refused:
+        with pytest.raises(ConfigError, match="looks away from the boat"):
+            build_target([WALL, across], [], 0.0, None)
+    else:
+        assert build_target([WALL, across], [], 0.0, None).faces[1].normal[0] == pytest.approx(1.0)
