@@ -36,11 +36,15 @@ def errors_of_pairs(seed: int) -> dict[str, Any]:
 
 def all_errors(seed: int) -> dict[str, Any]:
     """Return the blocks of a scenario on the usual target: the errors of pairs, of all laser ranges, and of faces."""
+    return errors_at(target_of(parse(Scenario, {"name": "target"}, "target").target), seed)
+
+
+def errors_at(model: TargetModel, seed: int, sigmas: AsBuilt = DEFAULTS) -> dict[str, Any]:
+    """Return the same at any target, whose faces are off by other sigmas."""
     draws = np.random.default_rng([seed, 3])
     blocks = _of_sensors(draws, draws)
     blocks["laser"]["range_bias_m"] = _drawn(draws, Laser, "range_bias_sigma_m")
-    model = target_of(parse(Scenario, {"name": "target"}, "target").target)
-    return blocks | {"surroundings": {"face_faults": list(face_faults(model, draws))}}
+    return blocks | {"surroundings": {"face_faults": list(face_faults(model, draws, sigmas))}}
 
 
 def _drawn(draws: Draws, sensor: type[Laser | Mbes], name: str) -> float:

@@ -60,7 +60,7 @@ class IterationSettings(Protocol):
 
 @dataclass(frozen=True)
 class StepLimits:
-    """Bounds of a small step of a mount parameter: a share of its sigma, or a value in rad or m if that is larger."""
+    """Bounds of a small step of a parameter: a share of its sigma, or a value in rad or m if that is larger."""
 
     sigmas: float
     rad: float
@@ -70,7 +70,7 @@ class StepLimits:
 CONVERGED = StepLimits(1e-3, 1e-10, 1e-9)  # after such a step no further step is necessary
 SETTLED = StepLimits(0.05, 1e-6, 1e-5)  # after such a step another reading would hardly change the weights
 LEAST_PASSES = 3  # readings of the points: for the drift, for outliers beside it, for their scale and the white noise
-CLOSING_STEPS = 3  # largest number of steps after the last reading, with its weights
+CLOSING_STEPS = 8  # largest number of steps after the last reading, with its weights: known parameters join in then
 
 
 @dataclass(frozen=True)
@@ -254,7 +254,12 @@ def weighted_iteration(
 
 
 def _is_small(solution: Solution, limits: StepLimits) -> bool:
-    """Return whether the step of each estimated mount parameter is within the limits."""
-    sigma = np.sqrt(np.diag(solution.covariance))[:N_MOUNT]
-    absolute = np.repeat([limits.rad, limits.m], 3)
-    return bool(np.all(np.abs(solution.step[:N_MOUNT]) <= np.maximum(limits.sigmas * sigma, absolute)))
+    """Return whether the step of each estimated mount parameter is within the limits; without these, of each surface's.
+
+    The turns and shifts of surfaces, rad and m, have the limit of rotations.
+    """
+    estimated = solution.estimated
+    judged = estimated < N_MOUNT if np.any(estimated < N_MOUNT) else np.ones(len(estimated), dtype=bool)
+    sigma = np.sqrt(np.diag(solution.covariance))[judged]
+    absolute = np.where((estimated >= 3) & (estimated < N_MOUNT), limits.m, limits.rad)[judged]
+    return bool(np.all(np.abs(solution.step[estimated][judged]) <= np.maximum(limits.sigmas * sigma, absolute)))

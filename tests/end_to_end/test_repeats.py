@@ -64,7 +64,7 @@ def test_the_second_time_nothing_is_imported_that_computes_or_draws(done: Place)
     ("block", "key", "value", "stage", "reason"),
     [
         ("segment", "margin_m", 0.04, "segment", "segment: segment.margin_m 0.015 -> 0.04"),
-        ("verdict", "max_sigma_deg", 0.06, "report", "report: verdict.max_sigma_deg 0.05 -> 0.06"),
+        ("verdict", "max_sigma_deg", 0.06, "report", "report: verdict.max_sigma_deg null -> 0.06"),
         pytest.param(
             "adjust", "robust_k0", 2.5, "segment", "segment: adjust.robust_k0 3.0 -> 2.5", marks=pytest.mark.thorough
         ),

@@ -15,16 +15,17 @@ Only the mount counts: errors of position, attitude, sound speed, ranges, clocks
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtri
 
 from pipeline.maths.geometry.rotations import skew
 
 Array = NDArray[np.float64]
 # A normal error is within so many sigmas with a probability of 95 %: on a line 1.96; in a plane, if equal, 2.45.
-ON_A_LINE, IN_A_PLANE = (float(np.sqrt(chdtri(dimensions, 0.05))) for dimensions in (1, 2))
+# In a plane the square has the distribution 1 - exp(-q² / 2).
+ON_A_LINE, IN_A_PLANE = NormalDist().inv_cdf(0.975), float(np.sqrt(-2 * np.log(0.05)))
 
 
 @dataclass(frozen=True)
