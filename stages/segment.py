@@ -47,6 +47,7 @@ from pipeline.maths.adjustment.drift_likelihood import EXACT
 from pipeline.maths.adjustment.pose_errors import PoseNoise
 from pipeline.mount import mount_of
 from pipeline.target.design import target_of
+from pipeline.target.gate import for_uncertain_faces
 from pipeline.target.labelled_points import LabellingContext, label_batch
 from pipeline.target.laser_search import refine_target_and_laser
 from pipeline.target.mount_search import search_mount
@@ -136,6 +137,7 @@ def search(inputs: Inputs, config: Config) -> LabellingContext:
     if config.mbes is not None:
         soundings = sounding_sample(inputs.soundings_pool, used(inputs.counts, "soundings"), trajectory)
         mount = search_mount(soundings, model, mount_of(config.mbes.mount), config.mbes, config.segment)
+        mount = for_uncertain_faces(mount, config.as_built, model)
     return LabellingContext(
         model=model,
         surface=ClosestSurface(model),

@@ -24,9 +24,9 @@ PLACES = (  # where texts for people are made
     "pipeline/adjustment", "pipeline/artefacts/count_codes.py", "pipeline/artefacts/parquet.py",
     "pipeline/artefacts/patent_tables.py", "pipeline/artefacts/streams.py", "pipeline/atomic_files.py",
     "pipeline/checking", "pipeline/coarse", "pipeline/config", "pipeline/console.py", "pipeline/entry_check",
-    "pipeline/exports", "pipeline/finding/dry_planes.py", "pipeline/finding/found_text.py",
-    "pipeline/finding/kept_points.py", "pipeline/finding/place.py", "pipeline/fleet", "pipeline/georeference",
-    "pipeline/language/chosen.py", "pipeline/maths",
+    "pipeline/exports", "pipeline/finding/bottom.py", "pipeline/finding/dry_planes.py",
+    "pipeline/finding/found_text.py", "pipeline/finding/kept_points.py", "pipeline/finding/place.py", "pipeline/fleet",
+    "pipeline/georeference", "pipeline/language/chosen.py", "pipeline/maths",
     "pipeline/limits", "pipeline/planning", "pipeline/readers", "pipeline/report", "pipeline/results", "pipeline/run",
     "pipeline/simulation", "pipeline/starting", "pipeline/target", "stages",
 )  # fmt: skip

@@ -8,7 +8,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipeline.maths.geometry.planes import Plane
-from pipeline.maths.geometry.rotations import rotation_from_quaternion
+from pipeline.maths.geometry.rotations import exp_so3, rotation_from_quaternion
 from pipeline.maths.geometry.trajectory import Trajectory
 from pipeline.maths.patent.lifted_moments import SIZE
 from pipeline.maths.target.face import HORIZONTAL_COSINE
@@ -66,6 +66,21 @@ def trajectory_in_pool(poses: pd.DataFrame) -> Trajectory:
 def trajectory_in_target(poses: pd.DataFrame, target_pose: pd.DataFrame) -> Trajectory:
     """Return the trajectory in the target frame: x_target = R_target_from_pool (x_pool - origin)."""
     return target_frame(target_pose).trajectory_from_pool(trajectory_in_pool(poses))
+
+
+def trajectory_without_drift(trajectory: Trajectory, drift: pd.DataFrame) -> Trajectory:
+    """Return a trajectory in the target frame, corrected by the slow errors of the table ``drift``: p + δ, Exp(ω) R.
+
+    Between two knots the errors are linear; without knots the trajectory stays.
+    """
+    if not len(drift):
+        return trajectory
+    start = trajectory.t_ns[0]
+    since, knots = ((times - start).astype(np.float64) for times in (trajectory.t_ns, drift["t_ns"].to_numpy()))
+    names = [*(f"{axis}_target_m" for axis in "xyz"), *(f"turn_{axis}_target_deg" for axis in "xyz")]
+    errors = np.column_stack([np.interp(since, knots, drift[name].to_numpy()) for name in names])
+    R_target_from_body = exp_so3(np.radians(errors[:, 3:])) @ trajectory.R_frame_from_body
+    return Trajectory.build(trajectory.t_ns, trajectory.positions_m + errors[:, :3], R_target_from_body)
 
 
 def family_names(faces: pd.DataFrame) -> list[str]:

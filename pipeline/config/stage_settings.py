@@ -77,9 +77,10 @@ class InsErrors(Model):
 
 
 class FacesAsBuilt(Model):
-    """The target as surveyed: deviations of its faces from the design, and the sigma of angles between families."""
+    """The target as surveyed: deviations of its faces from the design, and how wet faces may stand to dry ones."""
 
     faces: dict[str, float]
+    offset_sigma_m: float
     angle_sigma_deg: float
 
 

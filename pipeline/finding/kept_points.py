@@ -5,8 +5,9 @@ are kept. So the sample does not depend on how the files are divided or how many
 session have their share, and the memory is the same for any session.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -22,6 +23,7 @@ from pipeline.mount import Mounted
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Columns = Mapping[str, NDArray[Any]]
 MOST = 1_500_000  # points of the sample
 FARTHEST_M = 50.0  # of a point from the INS
 MAX_INTERVAL_NS = 100_000_000  # between two INS records, for a point between them to be placed
@@ -70,24 +72,41 @@ def level_context(ins: pd.DataFrame) -> PoolContext:
 
 def kept_points(stream: Stream, context: PoolContext, laser: LaserPlacement) -> KeptPoints:
     """Return the sample of a session's laser points; an error if the INS covers none of them."""
-    limit, read, number = ALL, 0, 0
-    pieces: list[Mapping[str, NDArray[np.generic]]] = []
-    for count, piece in stream.fold(_placed, context, laser):
-        read += count
-        pieces.append(_below(piece, limit))
-        number += len(pieces[-1]["drawn"])
-        while number > MOST:
-            limit //= 2
-            pieces = [_below(one, limit) for one in pieces]
-            number = sum(len(one["drawn"]) for one in pieces)
-    if not number:
+    read, sample = sampled(stream.fold(_placed, context, laser), MOST)
+    if not sample or not len(sample["t_ns"]):
         raise RawDataError(
             f"laser: none of {read:,} points lies within {FARTHEST_M:g} m of the boat while the INS recorded; "
             "check laser.mount, laser.frame and the clocks: poolcal check looks into them"
         )
+    return KeptPoints(sample["t_ns"], sample["own_m"], sample["level_m"], read, context)
+
+
+def sampled(batches: Iterable[tuple[int, Columns]], most: int) -> tuple[int, dict[str, NDArray[Any]]]:
+    """Return the number of all points, and the columns of a sample of at most so many, in order of time.
+
+    Parameters
+    ----------
+    batches
+        For each batch the number of its points, and columns of those that may be used, with ``t_ns`` and ``drawn``: the
+        number to which the time is :func:`scattered`.
+    most
+        Largest number of points of the sample.
+    """
+    limit, read, number = ALL, 0, 0
+    pieces: list[Columns] = []
+    for count, piece in batches:
+        read += count
+        pieces.append(_below(piece, limit))
+        number += len(pieces[-1]["drawn"])
+        while number > most:
+            limit //= 2
+            pieces = [_below(one, limit) for one in pieces]
+            number = sum(len(one["drawn"]) for one in pieces)
+    if not pieces:
+        return read, {}
     together = {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]}
     order = np.argsort(together["t_ns"], kind="stable")
-    return KeptPoints(together["t_ns"][order], together["own_m"][order], together["level_m"][order], read, context)
+    return read, {name: column[order] for name, column in together.items()}
 
 
 def _placed(batch: Batch, context: PoolContext, laser: LaserPlacement) -> tuple[int, dict[str, NDArray[np.generic]]]:
@@ -105,7 +124,7 @@ def _placed(batch: Batch, context: PoolContext, laser: LaserPlacement) -> tuple[
     }
 
 
-def _below(piece: Mapping[str, NDArray[np.generic]], limit: int) -> Mapping[str, NDArray[np.generic]]:
+def _below(piece: Columns, limit: int) -> Columns:
     if limit == ALL:
         return piece
     rows = np.flatnonzero(piece["drawn"] <= np.uint64(limit))

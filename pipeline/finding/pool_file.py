@@ -1,10 +1,20 @@
-"""A found place as a pool's config."""
+"""A found place as a pool's config, and a config with pieces of the bottom added."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeVar
 
 import numpy as np
+import yaml
 
+from pipeline.config.pool import PoolConfig
+from pipeline.finding.bottom import BottomPiece
 from pipeline.finding.place import DIGITS, FoundPlace
 
+Face = TypeVar("Face")
+
 FIRST = "# A target found by poolcal target in the laser's points. Strike faces that are no wall below the water:"
+FIRST_OF_BOTTOM = "# A target of walls and pieces of the bottom, these by poolcal target --bottom."
+BOTTOM = "bottom-"  # names of the pieces begin so
 AS_BUILT = """\
 as_built:                       # of walls below the water that nobody has surveyed: fouled, weathered
   offset_sigma_m: 0.02
@@ -31,3 +41,20 @@ def pool_yaml(place: FoundPlace) -> str:
         corners = ", ".join("[" + ", ".join(f"{value:.{DIGITS}f}" for value in row) + "]" for row in rows)
         lines.append(f"    {face.name}: {{corners: [{corners}]}}")
     return "\n".join(lines) + "\n" + AS_BUILT
+
+
+def walls_of(faces: Mapping[str, Face]) -> dict[str, Face]:
+    """Return the faces without the pieces of the bottom, which are found anew."""
+    return {name: face for name, face in faces.items() if not name.startswith(BOTTOM)}
+
+
+def with_bottom_yaml(pool: PoolConfig, pieces: Sequence[BottomPiece]) -> str:
+    """Return the text of a config with pieces of the bottom as faces of its target that the sonar alone sees."""
+    content: dict[str, Any] = pool.model_dump(mode="json", exclude_defaults=True)
+    bottom = {
+        f"{BOTTOM}{k}": {"corners": np.round(piece.corners_m, DIGITS).tolist(), "seen": "wet"}
+        for k, piece in enumerate(pieces, start=1)
+    }
+    content["target"] |= {"kind": "faces", "faces": walls_of(content["target"]["faces"]) | bottom}
+    text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, default_flow_style=None)
+    return f"{FIRST_OF_BOTTOM}\n{text}"

@@ -176,7 +176,11 @@ def assess_plan(plan: Plan, pool: PoolConfig, session: SessionConfig) -> PlanAss
     speeds, swings = (np.median([getattr(p, name) for p in plan.passes]) for name in ("speed_m_s", "heading_swing_deg"))
     coverage = Coverage(
         distances_m=[planned.distance_m for planned, _, points in given.each() if points["mbes"].any()],
-        soundings=soundings_by_family(setting, given),
+        soundings={
+            family: count
+            for family, count in soundings_by_family(setting, given).items()
+            if family in setting.model.tied_families
+        },
         level={family.name for family in setting.model.families if family.level},
         speed_m_s=float(speeds),
         heading_swing_deg=float(swings),

@@ -36,7 +36,7 @@ class Coverage:
     distances_m : Sequence[float]
         Distances of the passes with soundings.
     soundings : Mapping[str, int]
-        Number of soundings by family of faces.
+        Number of soundings by family of faces, of those that both sensors see: others tie the sonar to nothing.
     level : Collection[str]
         Names of the horizontal families.
     speed_m_s, heading_swing_deg : float

@@ -51,10 +51,10 @@ def geometry_table(
     solution : Solution
         The session's solution.
     """
-    usual = setting.plan.passes[0]
+    usual, tied = setting.plan.passes[0], setting.model.tied_families
     coverage = Coverage(
         distances_m=[float(distance) for distance in passes["distance_m"] if np.isfinite(distance)],
-        soundings=soundings,
+        soundings={family: count for family, count in soundings.items() if family in tied},
         level={family.name for family in setting.model.families if family.level},
         speed_m_s=_measured(passes["speed_m_s"].abs().median(), usual.speed_m_s),
         # the amplitude of a wave is √2 times its standard deviation

@@ -14,16 +14,35 @@ so that m over the gate, Φ⁻¹(1/4 + Φ(k) / 2) / k, falls from 1/2 for a narr
 median it gives k, and σ.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from pipeline.artefacts.streams import Batch, point_array
+from pipeline.config.stage_settings import FacesAsBuilt
+from pipeline.maths.target.model import TargetModel
 from pipeline.target.labelled_points import LabellingContext
 from pipeline.target.matching import GATE_SCALES, planes_of_faces
+from pipeline.target.search_results import ProvisionalMount
 
+WET_SIGMAS = 4.0  # of a wet face's place and of the noise together: two faces may be off to different sides
 LEAST_SIGMAS = 3.0  # a narrower gate, in sigmas of a family's noise, cuts it off
 NARROWEST, WIDEST = 0.5, 1000.0  # gates in sigmas that can be told from narrower and wider ones
 FEWEST = 50  # soundings of a family whose noise is trusted
 SHARE_OF_PERIOD = 0.5  # widest gate as a share of half the period: near the middle between parallel faces
+
+
+def for_uncertain_faces(mount: ProvisionalMount, as_built: FacesAsBuilt, model: TargetModel) -> ProvisionalMount:
+    """Return the provisional mount with a gate that takes in wet faces that may stand off the dry ones.
+
+    A wall that nobody has surveyed below the water may be off by centimetres, about the gate itself. Cut off at the
+    gate, its soundings would have their mean where the wall is believed to stand.
+    """
+    if not np.isfinite(mount.scale_m):
+        return mount
+    lean_m = np.radians(as_built.angle_sigma_deg) * model.depth_m / 2
+    reach_m = WET_SIGMAS * float(np.linalg.norm([as_built.offset_sigma_m, lean_m, mount.scale_m]))
+    return replace(mount, gate_m=max(mount.gate_m, min(reach_m, SHARE_OF_PERIOD * model.half_period_m)))
 
 
 def fitting_gate_m(labelled: Batch, context: LabellingContext) -> float:

@@ -19,6 +19,7 @@ from pipeline.target.sonar_beams import beams_in_target
 from pipeline.target.surface import ClosestSurface
 
 Array = NDArray[np.float64]
+LEAST_M, USUAL_DEG = 0.02, 3.0  # errors that soundings share: what moves them by less over such a search stays open
 BEHIND_M = 0.15  # noise does not bring a sounding farther behind a face
 
 
@@ -60,7 +61,8 @@ def search_mount(
     criteria = _criteria(placement, model, closest, settings)
     result = search(placement, _starts(placement, model, settings), surface, criteria)
     label = _wet_labeller(sample, model, coarse, mbes, settings)
-    refined = refine(placement, result.parameters, label, surface.planes)
+    least_m = LEAST_M * min(1.0, settings.search_mount_deg / USUAL_DEG)  # a narrow search moves points by less
+    refined = refine(placement, result.parameters, label, surface.planes, least_m=least_m)
     return ProvisionalMount(
         rotation_vector_rad=refined.parameters[:3],
         lever_arm_correction_m=refined.parameters[3:],
@@ -69,7 +71,7 @@ def search_mount(
         score=result.score,
         rival_score=result.rival_score,
         ambiguous=bool(result.rival_score > result.score * (1 - settings.ambiguity_margin)),
-        within=result.within,
+        within=result.or_within(refined.parameters, criteria.limits),
     )
 
 

@@ -52,7 +52,8 @@ def search_target_pose(
     sigmas = _pose_sigmas(model, settings, azimuth_known)
     closest = ClosestSurface(model)
     surface = TargetSurface(closest, planes_of_faces(model))
-    coarse = _best_start(TargetPose(dry.voxel_means_m, sigmas), surface, model.half_period_m, azimuth_known)
+    limits = 1.3 * sigmas + np.array([0.02, 0.05, 0.05, 0.02])
+    coarse = _best_start(TargetPose(dry.voxel_means_m, sigmas), surface, model.half_period_m, azimuth_known, limits)
     label = dry_labeller(model, settings)
     points = TargetPose(dry.points_m, sigmas)
     pose = refine(points, coarse.parameters, label, surface.planes, least_m=LEAST_M)
@@ -65,7 +66,7 @@ def search_target_pose(
         tilt=refine(tilted, np.zeros(6), label, surface.planes, rounds=2),
         rival=best_rival(scan, frame, model, closest, settings.ambiguity_share),
         gate_m=gate_of(pose, settings),
-        within=coarse.within,
+        within=coarse.or_within(pose.parameters, limits),
         pose_sigmas=sigmas,
     )
 
@@ -79,7 +80,7 @@ def _pose_sigmas(model: TargetModel, settings: Segment, azimuth_known: bool) -> 
 
 
 def _best_start(
-    placement: TargetPose, surface: TargetSurface, half_period_m: float, azimuth_known: bool
+    placement: TargetPose, surface: TargetSurface, half_period_m: float, azimuth_known: bool, limits: Array
 ) -> SearchResult:
     """Return the best pose of a search that starts from a grid of azimuths, horizontal shifts and heights."""
     azimuth, reach_xy, _, reach_z = placement.prior_sigmas
@@ -96,5 +97,4 @@ def _best_start(
     def quality(p: Array) -> float:
         return surface_score(placement, p, surface.closest, SCORE_REACH_M)
 
-    limits = 1.3 * placement.prior_sigmas + np.array([0.02, 0.05, 0.05, 0.02])
     return search(placement, starts, surface, SearchCriteria(same, quality, limits, starts_per_group=2))

@@ -43,9 +43,17 @@ def _target(
     session: Session,
     out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="write a pool's config with them")] = None,
     depth: Annotated[float, typer.Option("--depth", metavar="M", help="depth of the water at the wall")] = 4.0,
+    bottom: Annotated[
+        Path | None,
+        typer.Option("--bottom", metavar="RUN", help="a run of this session: find flat pieces of the bottom with it"),
+    ] = None,
     jobs: Jobs = None,
 ) -> int:
     """Find walls and slopes that can serve as a target, in the laser's points."""
+    if bottom is not None:
+        from stages.commands import target_bottom
+
+        return target_bottom.command(session, bottom, out, jobs)
     from stages.commands import target
 
     return target.command(session, out, depth, jobs)

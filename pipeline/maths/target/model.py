@@ -101,6 +101,12 @@ class TargetModel:
         ahead = [face for face in wet if not face.level and face.normal[0] < -0.9]
         return max(ahead, key=lambda face: face.width_m * self._depth(face), default=None)
 
+    @property
+    def tied_families(self) -> frozenset[str]:
+        """Return the names of the families whose plane both sensors may see: they tie the sonar to the laser."""
+        seen = {family.name: {self.faces[number].seen for number in family.faces} for family in self.families}
+        return frozenset(name for name, kinds in seen.items() if "both" in kinds or {"dry", "wet"} <= kinds)
+
     def _depth(self, face: Face) -> float:
         return float(min(face.vertices_m[:, 2].max(), self.water_level_m) - face.vertices_m[:, 2].min())
 

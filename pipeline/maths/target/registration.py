@@ -132,6 +132,14 @@ class SearchResult:
     rival_score: float
     within: bool
 
+    def or_within(self, refined: Array, limits: Array) -> bool:
+        """Return whether the pose, or what it was refined to, lies within the limits (k,).
+
+        Edges draw a pose far along directions that the faces leave open; the refinement, which has no edges, takes it
+        back to the prior there.
+        """
+        return self.within or bool(np.all(np.abs(refined) <= limits))
+
 
 def search(
     placement: SubsetPlacement, starts: Sequence[Sequence[Array]], surface: TargetSurface, criteria: SearchCriteria

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.maths.target.placements import TargetPose
-from pipeline.maths.target.registration import FacePlanes, Refinement, refine
+from pipeline.maths.target.registration import FacePlanes, Refinement, SearchResult, refine
 
 SIGMAS = np.array([np.radians(3.0), 0.5, 0.5, 0.5])
 WALLS = np.array([[-1.0, 0.0, 0.0], [-0.7, -0.7, 0.0], [-0.7, 0.7, 0.0]])
@@ -43,3 +43,14 @@ def test_height_is_found_on_a_slope() -> None:
 def test_what_is_determined_does_not_depend_on_what_is_left_to_the_prior(lean_deg: float) -> None:
     one, other = refined(lean_deg, least_m=0.02, bias_m=0.0), refined(lean_deg, least_m=0.0, bias_m=0.0)
     np.testing.assert_allclose(one.parameters[:3], other.parameters[:3], atol=3e-3)
+
+
+@pytest.mark.parametrize(
+    ("within", "refined", "said"),
+    [(True, (9.0, 9.0), True), (False, (0.1, -0.2), True), (False, (0.1, 0.31), False), (False, (-0.11, 0.0), False)],
+)
+def test_a_pose_that_edges_drew_too_far_is_judged_by_its_refinement(
+    within: bool, refined: tuple[float, float], said: bool
+) -> None:
+    found = SearchResult(np.array([0.0, 0.8]), 0.9, 0.0, within)
+    assert found.or_within(np.array(refined), np.array([0.1, 0.3])) == said
