@@ -25,7 +25,9 @@ def heading(target: Target, mounting: Mounting) -> list[str]:
 def _evidence(mounting: Mounting) -> list[str]:
     """Return what tells a sheet found in an office apart from another: verdict, time of the passes, digest."""
     origin = mounting.origin
-    verdict = ["Verdict: accepted."] if origin.rejected is None else []
+    verdict = [] if origin.rejected is not None else ["Verdict: accepted."]
+    if verdict and origin.purpose:
+        verdict = [f"Verdict: accepted for {origin.purpose}. Do not use the values for other surveys."]
     begins = [] if origin.start_utc is None else [f"First pass: {origin.start_utc}."]
     digest = [] if origin.digest is None else [f"SHA-256 of calibration.json: {origin.digest}"]
     return [*([" ".join([*verdict, *begins])] if verdict or begins else []), *digest]

@@ -94,7 +94,7 @@ class Origin:
 
     rejected: reasons of a rejected run, None if it was accepted; held: values that the run does not call good enough;
     free: what else was estimated with the mount, in words; start_utc: begin of the first pass; digest: SHA-256 of
-    calibration.json; kind: what the mount is, in words.
+    calibration.json; kind: what the mount is, in words; purpose: the only survey that it is good for, if there is one.
     """
 
     session: str
@@ -105,6 +105,7 @@ class Origin:
     free: tuple[str, ...] = ()
     start_utc: str | None = None
     digest: str | None = None
+    purpose: str = ""
 
 
 @dataclass(frozen=True)

@@ -57,6 +57,7 @@ def mounting_of(run: FinishedRun, sensor: Calibrated | None, although_rejected: 
             free=tuple(one_line(str(one["words"])) for one in run.result.get("free", {}).values()),
             start_utc=str(passes[0]["start_utc"]) if passes else None,
             digest=sha256(run.path / "report" / "calibration.json"),
+            purpose=one_line(str(run.result.get("limits", {}).get("in_words", ""))),
         )
         if sensor in (None, calibrated):
             mounting = _calibrated(run.path, run.result[calibrated], calibrated, origin)

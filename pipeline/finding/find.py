@@ -42,7 +42,7 @@ def find_place(ins: Stream, laser: Stream, session: SessionConfig, depth_m: floa
     planes = dry_planes(points.along(trajectory, mount).level_m, boat_m)
     level_m = water_level_m(planes)
     place = found_place(reaching_water(planes, level_m), level_m, context.frame, depth_m)
-    return replace(place, read=points.read, used=len(points))
+    return replace(place, read=points.read, used=len(points), boat_m=(float(boat_m[0]), float(boat_m[1])))
 
 
 def _read(ins: Stream) -> tuple[pd.DataFrame, list[Batch]]:

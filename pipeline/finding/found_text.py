@@ -12,14 +12,15 @@ def table_text(place: FoundPlace) -> str:
     """Return the planes that were found, those that serve first, and the place, for the screen."""
     names = {id(face.plane): face.name for face in place.faces}
     order = sorted(place.planes, key=lambda plane: (id(plane) not in names, names.get(id(plane), "")))
-    rows = [_row(names.get(id(plane), ""), plane) for plane in order]
-    head = ["face", "width m", "height m", "looks to °", "lean °", "uneven mm", "points", ""]
+    rows = [_row(names.get(id(plane), ""), plane, place.boat_m) for plane in order]
+    head = ["face", "lies to °", "away m", "width m", "height m", "looks to °", "lean °", "uneven mm", "points", ""]
     serve = f"{plural(len(place.faces), 'face')} of {plural(len(place.planes), 'plane')} can serve"
     return "\n".join(
         [
             f"{place.read:,} laser points, {place.used:,} of them used: {serve}.",
             "",
-            *text_table("  <10>9>10>11>8>11>10  <1", head, rows),
+            *text_table("  <10>10>8>9>10>11>8>11>10  <1", head, rows),
+            "Lies to, away: direction (from true north) and distance of its middle from that of the boat's track.",
             "",
             f"Origin: latitude {place.latitude_deg:.9f}, longitude {place.longitude_deg:.9f}, height "
             f"{place.height_m:.3f}; azimuth {place.azimuth_deg:.3f}°; the water is at {place.water_level_m:.3f} m.",
@@ -27,11 +28,17 @@ def table_text(place: FoundPlace) -> str:
     )
 
 
-def _row(name: str, plane: DryPlane) -> list[str]:
+def _row(name: str, plane: DryPlane, boat_m: tuple[float, float]) -> list[str]:
+    lies, away = "-", "-"
+    if len(plane.outline_m):
+        east, north = plane.corners_m(plane.outline_m.mean(axis=0)[None])[0, :2] - boat_m
+        lies, away = f"{np.degrees(np.arctan2(east, north)) % 360:.0f}", f"{np.hypot(east, north):.1f}"
     looks = float(np.degrees(np.arctan2(plane.normal[0], plane.normal[1]))) % 360
     flat = plane.flat
     return [
         name or "-",
+        lies,
+        away,
         f"{flat.width_m:.1f}",
         f"{flat.height_m:.1f}",
         f"{looks:.1f}",

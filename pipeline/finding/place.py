@@ -35,7 +35,8 @@ class FoundFace:
 class FoundPlace:
     """A target: origin and azimuth, the height of the water in its frame, its faces.
 
-    planes: all that were found; read, used: numbers of laser points.
+    planes: all that were found; read, used: numbers of laser points; boat_m: the middle of the boat's track, east and
+    north in the planes' frame.
     """
 
     latitude_deg: float
@@ -47,6 +48,7 @@ class FoundPlace:
     planes: tuple[DryPlane, ...]
     read: int = 0
     used: int = 0
+    boat_m: tuple[float, float] = (0.0, 0.0)
 
 
 def found_place(planes: Sequence[DryPlane], level_m: float, frame: PoolFrame, depth_m: float) -> FoundPlace:

@@ -56,5 +56,8 @@ def with_bottom_yaml(pool: PoolConfig, pieces: Sequence[BottomPiece]) -> str:
         for k, piece in enumerate(pieces, start=1)
     }
     content["target"] |= {"kind": "faces", "faces": walls_of(content["target"]["faces"]) | bottom}
+    if pool.verdict.purpose != "pool":  # what it is judged for is told in full
+        told = {"purpose", "depth_m", "swath_deg", "mount_share"}
+        content["verdict"] |= pool.verdict.model_dump(mode="json", include=told)
     text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, default_flow_style=None)
     return f"{FIRST_OF_BOTTOM}\n{text}"

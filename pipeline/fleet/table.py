@@ -17,6 +17,7 @@ from pipeline.text_table import text_table
 LAYOUT = "<8" + " >8" * 3 + " >6" * 3 + "  <12"  # behind the session's name
 WIDTH, LEAST_LABEL, MOST_SINCE = 100, 12, 17  # columns
 DECIMALS = {"deg": 4, "m": 3}  # 0.0001° is 0.05 mm at 30 m
+FOR = " for "  # in a verdict in words, before what an accepted calibration is good for
 MOST_NAMED = 3  # stages; of more than these the table shows the first and the last
 UP_TO_DATE = "up to date"
 BAD = {REJECTED: "rejected", COULD_NOT_RUN: "refused", BUG: "bug"}
@@ -45,7 +46,7 @@ class Outcome:
     @property
     def verdict(self) -> str:
         """The verdict, *in part* for one that is accepted in part; without one, why there is none."""
-        word = BAD.get(self.answer.status, self.answer.verdict)
+        word = BAD.get(self.answer.status, self.answer.verdict.partition(FOR)[0])
         return word.removeprefix("accepted ")
 
     @property
@@ -95,6 +96,7 @@ def outcome_table(outcomes: Sequence[Outcome], moved: Mapping[Path, str]) -> lis
         rows.append((outcome.verdict, *values, since if len(since) <= MOST_SINCE else short))
         where = outcome.session.label
         below += [outcome.complaint] if outcome.complaint else []
+        below += [f"{where}: {outcome.answer.verdict}"] if FOR in outcome.answer.verdict else []
         below += [f"{where}: has moved since the session before: {what}"] if what else []
         below += [f"{where}: {kind} not drawn" for kind in outcome.answer.not_drawn]
     head = ("verdict", *heads, "since before")

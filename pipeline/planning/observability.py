@@ -22,8 +22,8 @@ TWICE = 2  # number of further passes at such a distance
 VAGUE = 1.0  # rad or m: prior sigma of every parameter
 SIDES = {"P1": "the faces on the -y side (P1)", "P3": "the faces on the +y side (P3)", "P2": "the wall (P2)"}
 HORIZONTAL = (
-    "the sonar sees no horizontal face: only the boat's rolling and pitching determine its height, and a still "
-    "boat leaves it open"
+    "no horizontal face is seen by both sensors: only the boat's rolling and pitching determine the sonar's height, "
+    "and a still boat leaves it open"
 )
 
 

@@ -103,9 +103,11 @@ def target_found(model: TargetModel) -> list[Statement]:
     """Return a warning if the target is one that was found in laser points."""
     if not model.found:
         return []
+    found = [face for face in model.faces if face.seen != "wet"]
+    depth_m = model.water_level_m - min(float(face.vertices_m[:, 2].min()) for face in found)
     words = (
-        f"the target was found in laser points ({', '.join(face.name for face in model.faces)}): that its faces go "
-        f"straight on to {model.depth_m:.1f} m below the water is an assumption; look at the residuals by height"
+        f"the target was found in laser points ({', '.join(face.name for face in found)}): that its faces go straight "
+        f"on to {depth_m:.1f} m below the water is an assumption; look at the residuals by height"
     )
     return [Statement(ReasonCode.TARGET_FOUND, words)]
 

@@ -113,13 +113,18 @@ def _table(pieces: Sequence[BottomPiece], used: Sequence[BottomPiece], read: int
     """Return the pieces as text: those that serve by their names, then the others, which have reasons, by number."""
     rows = [_row(f"bottom-{k}", piece) for k, piece in enumerate(used, start=1)]
     names = {id(piece) for piece in used}
-    rows += [_row("-", piece) for piece in pieces if id(piece) not in names]
+    spare = f"not needed: {len(used)} are enough"
+    rows += [
+        _row("-", piece, f"refused: {piece.refused}" if piece.refused else spare)
+        for piece in pieces
+        if id(piece) not in names
+    ]
     heads = ["face", "depth m", "slope °", "uneven mm", "apart mm", "passes", "soundings", ""]
     said = f"{read:,} soundings: {len(used)} of {len(pieces)} pieces of the bottom can serve."
     return "\n".join([said, "", *text_table("  <10>9>9>11>10>8>11  <1", heads, rows)])
 
 
-def _row(name: str, piece: BottomPiece) -> list[str]:
+def _row(name: str, piece: BottomPiece, why: str = "") -> list[str]:
     return [
         name,
         f"{piece.depth_m:.2f}",
@@ -128,5 +133,5 @@ def _row(name: str, piece: BottomPiece) -> list[str]:
         f"{1000 * piece.apart_m:.0f}",
         str(len(piece.passes)),
         f"{piece.soundings:,}",
-        piece.refused and f"refused: {piece.refused}",
+        why,
     ]

@@ -52,7 +52,8 @@ def test_the_bottom_makes_the_same_session_better(dock: tuple[Path, Path, Told],
     assert {face["seen"] for face in pieces.values()} == {"wet"}
     heights = np.array([corner[2] for face in pieces.values() for corner in face["corners"]])
     assert np.abs(heights + 4.3).max() < 0.06  # the floor lies 0.3 m below the wall's foot
-    assert written["verdict"] == {"purpose": "special_order"}  # the rest of the run's config stays
+    meant = {"purpose": "special_order", "depth_m": 20.0, "swath_deg": 60.0, "mount_share": 0.3}
+    assert written["verdict"] == meant  # the rest of the run's config stays
 
     again = tmp_path / "run"
     told = poolcal("run", session, "--config", wall, "--run", again, "--no-report", "--no-recordings")
@@ -61,7 +62,9 @@ def test_the_bottom_makes_the_same_session_better(dock: tuple[Path, Path, Told],
     assert after["roll_deg"] < 0.5 * before["roll_deg"]
     assert after["pitch_deg"] < before["pitch_deg"]
     assert errors_in_sigmas(again, session).max() < 4.5
-    assert "sees no horizontal face" in " ".join(result_of(again)["warnings"])  # a bottom ties no heights
+    warned = " ".join(result_of(again)["warnings"])
+    assert "no horizontal face is seen by both sensors" in warned  # a bottom ties no heights
+    assert "bottom-" not in warned  # and was not found in laser points
 
     told = poolcal("target", session, "--bottom", again, "--out", wall)  # found anew, not added to the old ones
     renewed = yaml.safe_load(wall.read_text("utf-8"))["target"]["faces"]

@@ -220,3 +220,9 @@ def test_a_form_tells_which_run_it_is_of(name: str) -> None:
     words = " ".join(text_of(name, origin=replace(ORIGIN, digest="ab" * 32)).split())
     assert f"Verdict: accepted. First pass: {ORIGIN.start_utc}." in words
     assert f"SHA-256 of calibration.json: {'ab' * 32}" in words
+
+
+@pytest.mark.parametrize("name", sorted(set(TARGETS) - {"kluster"}))
+def test_a_form_tells_for_which_survey_the_values_are(name: str) -> None:
+    words = " ".join(text_of(name, origin=replace(ORIGIN, purpose="Order 1a (IHO S-44) down to 12 m")).split())
+    assert "Verdict: accepted for Order 1a (IHO S-44) down to 12 m. Do not use the values for other surveys." in words

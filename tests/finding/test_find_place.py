@@ -110,4 +110,7 @@ def test_the_drift_makes_no_wall_uneven(seed: int, monkeypatch: pytest.MonkeyPat
 def test_the_screen_says_what_serves_and_why_the_rest_does_not() -> None:
     said = table_text(found(made(turned(20.0))))
     assert "3 faces of" in said
+    rows = {line.split()[0]: line.split() for line in said.splitlines() if line.lstrip().startswith("wall-")}
+    assert [float(word) for word in rows["wall-2"][1:3]] == pytest.approx([110.0, 5.5], abs=2.0)  # +x, right of 20°
+    assert float(rows["wall-1"][1]) > 110.0 > float(rows["wall-3"][1])  # wall-1 astern, wall-3 ahead
     assert "wall-2" in said

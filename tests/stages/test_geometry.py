@@ -49,9 +49,9 @@ def labelled(scenario: str, seed: int) -> dict[str, Any]:
     ("scenario", "families", "accepted", "gap"),
     [
         pytest.param({}, ("P2",), False, "the sonar sees the wall alone", id="wall alone"),
-        pytest.param({}, ("P1", "P2", "P3"), None, "the sonar sees no horizontal face", id="no H, moving"),
+        pytest.param({}, ("P1", "P2", "P3"), None, "no horizontal face is seen by both sensors", id="no H, moving"),
         pytest.param({}, ("P1", "P2", "H"), None, "the sonar sees nothing of the faces on the +y side (P3)", id="side"),
-        pytest.param(STILL, ("P1", "P2", "P3"), False, "the sonar sees no horizontal face", id="no H, still"),
+        pytest.param(STILL, ("P1", "P2", "P3"), False, "no horizontal face is seen by both sensors", id="no H, still"),
         pytest.param({"track": {"distances_m": [5.0]}}, ALL, None, "one pass alone has soundings, at 5.0 m", id="pass"),
         pytest.param({"track": {"distances_m": [6.0, 6.0]}}, ALL, None, "all passes lie at 6.0 to 6.0 m", id="far"),
     ][: often(2, 6)],
