@@ -1,4 +1,4 @@
-"""Write the pages of docs/reference that are made from the program: commands, reasons by code, the pool's config.
+"""Write the pages that are made from the program: commands, reasons by code, the pool's config, conventions.
 
 A test compares them with the program, so that a change of a command or of a reason asks for them anew:
 
@@ -72,7 +72,17 @@ def pool_page() -> str:
     return f"{POOL}\n```yaml\n{(DOCS.parent / 'configs' / 'defaults.yaml').read_text(encoding='utf-8')}```\n"
 
 
-PAGES = {"reference/pool.md": pool_page, "reference/commands.md": commands_page, "reference/reasons.md": reasons_page}
+def conventions_page() -> str:
+    """Return docs/theory/conventions.md: the repository's CONVENTIONS.md."""
+    return (DOCS.parent / "CONVENTIONS.md").read_text(encoding="utf-8")
+
+
+PAGES = {
+    "reference/pool.md": pool_page,
+    "reference/commands.md": commands_page,
+    "reference/reasons.md": reasons_page,
+    "theory/conventions.md": conventions_page,
+}
 
 
 def main() -> None:

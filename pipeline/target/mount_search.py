@@ -71,7 +71,7 @@ def search_mount(
         score=result.score,
         rival_score=result.rival_score,
         ambiguous=bool(result.rival_score > result.score * (1 - settings.ambiguity_margin)),
-        within=result.or_within(refined.parameters, criteria.limits),
+        within=result.or_within(refined.parameters, criteria.limits, edges_known=not model.found),
     )
 
 

@@ -66,7 +66,7 @@ def search_target_pose(
         tilt=refine(tilted, np.zeros(6), label, surface.planes, rounds=2),
         rival=best_rival(scan, frame, model, closest, settings.ambiguity_share),
         gate_m=gate_of(pose, settings),
-        within=coarse.or_within(pose.parameters, limits),
+        within=coarse.or_within(pose.parameters, limits, edges_known=not model.found),
         pose_sigmas=sigmas,
     )
 

@@ -132,13 +132,14 @@ class SearchResult:
     rival_score: float
     within: bool
 
-    def or_within(self, refined: Array, limits: Array) -> bool:
-        """Return whether the pose, or what it was refined to, lies within the limits (k,).
+    def or_within(self, refined: Array, limits: Array, edges_known: bool) -> bool:
+        """Return whether the pose lies within the limits (k,).
 
-        Edges draw a pose far along directions that the faces leave open; the refinement, which has no edges, takes it
-        back to the prior there.
+        The edges of a found target are where the laser's points end, inside its true edges. They draw a pose far along
+        directions that the faces leave open. The refinement, which has no edges, takes it back to the prior there, and
+        is judged in its place. The edges of a drawn target tell the truth: a height that is wrong, above all.
         """
-        return self.within or bool(np.all(np.abs(refined) <= limits))
+        return self.within or (not edges_known and bool(np.all(np.abs(refined) <= limits)))
 
 
 def search(

@@ -46,11 +46,17 @@ def test_what_is_determined_does_not_depend_on_what_is_left_to_the_prior(lean_de
 
 
 @pytest.mark.parametrize(
-    ("within", "refined", "said"),
-    [(True, (9.0, 9.0), True), (False, (0.1, -0.2), True), (False, (0.1, 0.31), False), (False, (-0.11, 0.0), False)],
+    ("within", "refined", "edges_known", "said"),
+    [
+        (True, (9.0, 9.0), True, True),
+        (False, (0.1, -0.2), False, True),
+        (False, (0.1, 0.31), False, False),
+        (False, (-0.11, 0.0), False, False),
+        (False, (0.1, -0.2), True, False),
+    ],
 )
-def test_a_pose_that_edges_drew_too_far_is_judged_by_its_refinement(
-    within: bool, refined: tuple[float, float], said: bool
+def test_a_pose_that_the_edges_of_a_found_target_drew_too_far_is_judged_by_its_refinement(
+    within: bool, refined: tuple[float, float], edges_known: bool, said: bool
 ) -> None:
     found = SearchResult(np.array([0.0, 0.8]), 0.9, 0.0, within)
-    assert found.or_within(np.array(refined), np.array([0.1, 0.3])) == said
+    assert found.or_within(np.array(refined), np.array([0.1, 0.3]), edges_known) == said
