@@ -2,10 +2,11 @@
 
 A point is kept if the number that its time is scattered to lies below a limit, which falls by half whenever too many
 are kept. So the sample does not depend on how the files are divided or how many workers read them, all stretches of the
-session have their share, and the memory is the same for any session.
+session have their share, and the memory is the same for any session. Where the files say how many points they have, the
+limit begins so low that not many more than are kept are placed.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,18 +14,20 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline.artefacts.streams import Batch, Stream, point_array
+from pipeline.artefacts.streams import Batch, Part, Stream, point_array
 from pipeline.config.stage_settings import LaserPlacement
 from pipeline.errors import RawDataError
 from pipeline.georeference.placement import laser_in_pool
 from pipeline.georeference.pool_context import PoolContext
 from pipeline.maths.geometry.trajectory import Trajectory
 from pipeline.mount import Mounted
+from pipeline.readers.las import LasPart
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Columns = Mapping[str, NDArray[Any]]
-MOST = 1_500_000  # points of the sample
+MOST = 750_000  # points of the sample
+PLACED = 4 * MOST  # points that are placed, near the boat or not, if the files say how many there are
 FARTHEST_M = 50.0  # of a point from the INS
 MAX_INTERVAL_NS = 100_000_000  # between two INS records, for a point between them to be placed
 EVERYWHERE = (np.full(3, -np.inf), np.full(3, np.inf))
@@ -72,7 +75,8 @@ def level_context(ins: pd.DataFrame) -> PoolContext:
 
 def kept_points(stream: Stream, context: PoolContext, laser: LaserPlacement) -> KeptPoints:
     """Return the sample of a session's laser points; an error if the INS covers none of them."""
-    read, sample = sampled(stream.fold(_placed, context, laser), MOST)
+    limit = first_limit(stream.parts)
+    read, sample = sampled(stream.fold(_placed, context, laser, limit), MOST)
     if not sample or not len(sample["t_ns"]):
         raise RawDataError(
             f"laser: none of {read:,} points lies within {FARTHEST_M:g} m of the boat while the INS recorded; "
@@ -109,10 +113,21 @@ def sampled(batches: Iterable[tuple[int, Columns]], most: int) -> tuple[int, dic
     return read, {name: column[order] for name, column in together.items()}
 
 
-def _placed(batch: Batch, context: PoolContext, laser: LaserPlacement) -> tuple[int, dict[str, NDArray[np.generic]]]:
+def first_limit(parts: Sequence[Part]) -> int:
+    """Return the limit by which at most ``PLACED`` points are placed, as far as LAS files say how many they have."""
+    claimed, limit = sum(part.stop - part.start for part in parts if isinstance(part, LasPart)), ALL
+    while claimed > PLACED:
+        claimed, limit = claimed // 2, limit // 2
+    return limit
+
+
+def _placed(
+    batch: Batch, context: PoolContext, laser: LaserPlacement, limit: int
+) -> tuple[int, dict[str, NDArray[np.generic]]]:
     """Return the number of a batch's points, and those near the boat, placed, with the number each has drawn."""
     t_ns = np.asarray(batch["t_ns"], dtype=np.int64)
-    rows = np.flatnonzero(context.trajectory.covers(t_ns, MAX_INTERVAL_NS))
+    drawn = scattered(t_ns)
+    rows = np.flatnonzero((drawn <= np.uint64(limit)) & context.trajectory.covers(t_ns, MAX_INTERVAL_NS))
     times, points = t_ns[rows], point_array(batch, "m", rows)
     own, level = laser_in_pool(times, points, context, laser)
     near = np.flatnonzero(np.einsum("ni,ni->n", own, own) <= FARTHEST_M**2)
@@ -120,7 +135,7 @@ def _placed(batch: Batch, context: PoolContext, laser: LaserPlacement) -> tuple[
         "t_ns": times[near],
         "own_m": own[near],
         "level_m": level[near],
-        "drawn": scattered(times[near]),
+        "drawn": drawn[rows[near]],
     }
 
 

@@ -1,5 +1,7 @@
 """The sample of the laser's points: it does not depend on how they are read, and it has its limit."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -8,8 +10,19 @@ from pipeline.config.session import SessionConfig
 from pipeline.config.stage_settings import LaserPlacement
 from pipeline.config.yaml_models import parse
 from pipeline.errors import RawDataError
-from pipeline.finding.kept_points import FARTHEST_M, KeptPoints, kept_points, level_context, scattered
+from pipeline.finding.kept_points import (
+    ALL,
+    FARTHEST_M,
+    MOST,
+    PLACED,
+    KeptPoints,
+    first_limit,
+    kept_points,
+    level_context,
+    scattered,
+)
 from pipeline.mount import mount_of
+from pipeline.readers.las import LasPart
 from pipeline.readers.track_tables import trajectory_table
 from pipeline.simulation.session import SimulatedSession
 from tests.support.simulated import made
@@ -69,3 +82,28 @@ def test_scattered_numbers_are_even_and_their_own() -> None:
 def test_another_clock_is_one_line(session: SimulatedSession) -> None:
     with pytest.raises(RawDataError, match=r"none of .* points lies within 50 m of the boat while the INS recorded"):
         kept(session, 1, shift_ns=3_600_000_000_000)
+
+
+def stretch(start: int, stop: int) -> LasPart:
+    return LasPart(Path("a.laz"), "a.laz", True, start, stop, 0, "laser", "", 0.0, None, None, 0.0)
+
+
+def test_of_large_files_few_points_are_placed() -> None:
+    """By halves, so that never fewer than half of what may be placed are; of other files nobody knows the number."""
+    assert first_limit([stretch(0, PLACED)]) == ALL
+    assert first_limit([stretch(0, PLACED), stretch(PLACED, PLACED + 2)]) == ALL // 2
+    assert first_limit([stretch(0, 4_000_000), stretch(4_000_000, 8 * PLACED)]) == ALL // 8
+    assert first_limit([MemoryPart("0", {"t_ns": np.zeros(10 * PLACED, dtype=np.int8)})]) == ALL
+    assert PLACED >= 4 * MOST
+
+
+def test_the_sample_is_the_same_if_fewer_points_are_placed(
+    session: SimulatedSession, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pipeline.finding.kept_points.MOST", 2000)
+    whole = kept(session, 2)
+    monkeypatch.setattr("pipeline.finding.kept_points.first_limit", lambda _: ALL // 4)
+    fewer = kept(session, 2)
+    assert fewer.read == whole.read
+    np.testing.assert_array_equal(fewer.t_ns, whole.t_ns)
+    np.testing.assert_array_equal(fewer.level_m, whole.level_m)

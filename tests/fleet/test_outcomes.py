@@ -116,6 +116,15 @@ def test_the_table_shows_what_may_be_used_and_below_it_why_not(outcomes: list[Ou
     ]
 
 
+def test_what_was_accepted_for_one_kind_of_survey_says_so_below_the_table(outcomes: list[Outcome]) -> None:
+    answer = answer_about(_result(limits={"in_words": "Order 1a (IHO S-44) down to 12 m, beams to 50°"}), [], [])
+    outcome = replace(outcomes[0], answer=answer)
+    table = outcome_table([outcome], {})
+    assert table[1].split()[:2] == ["data/good", "accepted"]
+    assert table[2:] == ["", "data/good: accepted for Order 1a (IHO S-44) down to 12 m, beams to 50°"]
+    assert outcome.line.startswith("data/good: accepted for Order 1a (IHO S-44) down to 12 m, beams to 50°; up to date")
+
+
 @pytest.mark.parametrize(("since", "shown"), [("no movement shown", "no movement shown"),
                                               ("moved: pitch, roll, yaw, x", "moved")])  # fmt: skip
 @pytest.mark.parametrize("name", ["a" * 60 + "2026-05-12", "水池" * 20 + "2026-05-12"])
