@@ -4,6 +4,7 @@ Each session is simulated, with all errors drawn by their sigmas and wet faces o
 finds the target in the laser's points and calibrates. Its rows stand in runs/places/ (``tools.campaign_files``).
 
     python -m tools.place_campaign [--only wall return ...] [--sessions 60] [--jobs 2] [--resume] > FILE.md
+    python -m tools.place_campaign --drawn [...]   # also with the true target drawn: how far the values differ
 """
 
 import argparse
@@ -21,6 +22,7 @@ import yaml
 
 from pipeline.config.pool import AsBuilt
 from pipeline.config.yaml_models import parse
+from pipeline.maths.comparison import mount_error
 from pipeline.simulation.scenario import Scenario
 from pipeline.target.design import target_of
 from tools.campaign_files import collect_rows
@@ -38,11 +40,12 @@ CONFIG: dict[str, Any] = {"target": {"kind": "found", "depth_m": 4.0}, "verdict"
 
 @dataclass(frozen=True)
 class Task:
-    """A session: its place, and its seed; ``planned``: whether the plan's sigmas are computed, too."""
+    """A session: its place, and its seed; whether the plan's sigmas, and the values on the drawn target, are wanted."""
 
     place: str
     seed: int
     planned: bool = False
+    drawn: bool = False
 
 
 def row_of(task: Task) -> dict[str, Any]:
@@ -66,9 +69,26 @@ def row_of(task: Task) -> dict[str, Any]:
         found = json.loads((run / "found.json").read_text("utf-8"))["found"]
         if task.planned:
             row |= _predicted(session, found, scenario)
+        if task.drawn:
+            row |= _by_drawing(session, calibration)
     row |= {"verdict": calibration["verdict"], "reasons": " | ".join(calibration["reasons"])}
     row |= {"codes": " ".join(dict.fromkeys(calibration["reason_codes"])), "faces": len(found["target"]["faces"])}
     return row | error_columns(calibration["methods"]["adjustment"], truth)
+
+
+def _by_drawing(session: Path, by_finding: dict[str, Any]) -> dict[str, float]:
+    """Return the values on the found target less those on the drawn one, in total sigmas of the former."""
+    content = yaml.safe_load((session / "pool.yaml").read_text("utf-8"))
+    content["as_built"] = AS_BUILT.model_dump(mode="json")
+    config, run = session.parent / "drawn.yaml", session.parent / "by-drawing"
+    config.write_text(yaml.safe_dump(content), encoding="utf-8")
+    options = ["--jobs", "1", "--no-report", "--no-recordings"]
+    _poolcal(["run", session, "--config", config, "--run", run, *options], (0, 1))
+    other = json.loads((run / "report" / "calibration.json").read_text("utf-8"))
+    found, drawn = (one["methods"]["adjustment"] for one in (by_finding, other))
+    mounts = [(np.array(one["R_body_from_mbes"]), np.array(one["lever_arm_m"])) for one in (drawn, found)]
+    apart = mount_error(*mounts[1], *mounts[0]) / np.sqrt(np.diag(found["covariance_total"]))
+    return {f"apart_{name}": float(value) for name, value in zip(NAMES, apart, strict=True)}
 
 
 def _predicted(session: Path, found: dict[str, Any], scenario: dict[str, Any]) -> dict[str, float]:
@@ -155,21 +175,34 @@ def _line(place: str, rows: pd.DataFrame) -> str:
     return f"| {' | '.join(cells)} |"
 
 
+def _differences(table: pd.DataFrame) -> str:
+    """Return a line for each place: how far the values on the found and on the drawn target differ, RMS in sigmas."""
+    lines = ["Values on the found target less those on the drawn one, RMS in total sigmas:", ""]
+    for place, rows in table.groupby("place", sort=False):
+        each = np.sqrt((rows[[f"apart_{name}" for name in NAMES]].to_numpy(float) ** 2).mean(axis=0))
+        named = ", ".join(f"{name} {size:.2f}" for name, size in zip(NAMES, each, strict=True))
+        lines.append(f"* {place} ({len(rows)} sessions): {named}; all {np.sqrt(np.mean(each**2)):.2f}")
+    return "\n".join(lines)
+
+
 def main() -> None:
     """Run the campaign and print its table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", nargs="+", default=list(PLACES), choices=list(PLACES), help="places; default: all")
     parser.add_argument("--sessions", type=int, default=60, help="of each place; default: 60")
     parser.add_argument("--jobs", type=int, default=2, help="sessions at a time; default: 2")
+    parser.add_argument("--drawn", action="store_true", help="calibrate on the drawn target, too, and compare")
     parser.add_argument("--resume", action="store_true", help="keep the rows of an interrupted campaign")
     given = parser.parse_args()
     tables = []
     for place in given.only:
         first = FIRST_SEED + 1000 * list(PLACES).index(place)
-        tasks = [Task(place, first + k, planned=k == 0) for k in range(given.sessions)]
+        tasks = [Task(place, first + k, planned=k == 0, drawn=given.drawn) for k in range(given.sessions)]
         path = FOLDER / f"{place}.parquet"
         tables.append(collect_rows(path, row_of, tasks, given.jobs, given.resume, TASKS_OF_A_WORKER))
-    print(summary(pd.concat(tables)))
+    print(summary(pd.concat(tables)), end="")
+    if given.drawn:
+        print(_differences(pd.concat(tables)))
 
 
 if __name__ == "__main__":
