@@ -129,7 +129,10 @@ def _check_at_target(session: _Session, epochs: dict[str, Times], unusable: set[
         words = "target.azimuth_deg is not given, and the boat never has target.origin within 20 m abeam"
         return replace(away, findings=(Finding("side", f"{words}; give azimuth_deg, or check target.origin"),))
     track = track_of(ins, frame, model, files, pool.ingest, sees_port(session.settings))
-    findings = list(track_checks.sailing_findings(track, pool.target_place))
+    findings = [
+        *track_checks.sailing_findings(track, pool.target_place),
+        *track_checks.water_findings(track.legs, pool.segment.water_margin_m),
+    ]
     usable = [sensor for sensor in ("laser", "mbes") if sensor in epochs and sensor not in unusable]
     of_points: list[Finding] = []
     counts = None
