@@ -19,6 +19,8 @@ from pipeline.mount import mount_of
 from pipeline.readers.file_summaries import thin_sigmas
 from pipeline.readers.track_tables import trajectory_table
 
+PROVISIONAL = 250_000  # points of the planes that the drift is taken from
+
 
 def find_place(ins: Stream, laser: Stream, session: SessionConfig, depth_m: float) -> FoundPlace:
     """Return the target that a session's laser points show.
@@ -36,7 +38,8 @@ def find_place(ins: Stream, laser: Stream, session: SessionConfig, depth_m: floa
     context, mount = level_context(records), mount_of(session.laser.mount)
     points = kept_points(laser, context, narrow(LaserPlacement, session.laser))
     boat_m = context.trajectory.positions_m.mean(axis=0)
-    serving = [plane for plane in dry_planes(points.level_m, boat_m) if not plane.refused]
+    some = points.level_m[:: max(1, len(points) // PROVISIONAL)]
+    serving = [plane for plane in dry_planes(some, boat_m) if not plane.refused]
     noise = _pose_noise(session, sigmas, records["t_ns"].to_numpy())
     trajectory = track_without_drift(points, serving, mount, narrow(LaserPoints, session.laser), noise)
     planes = dry_planes(points.along(trajectory, mount).level_m, boat_m)

@@ -29,6 +29,7 @@ from pipeline.mount import Mounted
 
 Array = NDArray[np.float64]
 MOST = 200_000  # points that are adjusted
+READINGS = 4  # of these points: the planes are found anew along the track, and need not settle
 GATE_M = 0.1  # of a point from its plane: the drift, and the plane's own error
 
 
@@ -56,7 +57,7 @@ def track_without_drift(
         return trajectory
     problem = _problem(planes, trajectory, mount, sigmas, noise)
     stream = Stream((MemoryPart("laser", batch),))
-    adjusted = weighted_iteration(problem, {"laser": stream}, Adjust(), Ingest().max_gap_s)
+    adjusted = weighted_iteration(problem, {"laser": stream}, Adjust(max_iterations=READINGS), Ingest().max_gap_s)
     return trajectory if adjusted.deficient else adjusted.last.drift.corrected(trajectory)
 
 
