@@ -9,7 +9,12 @@ import pandas as pd
 from pipeline.adjustment.ins_drift import drift_model, pose_noise
 from pipeline.adjustment.laser_design import laser_problem, surveyed_displacement
 from pipeline.adjustment.problem import CalibrationProblem, SessionData, designed_surfaces, sonar_problem
-from pipeline.adjustment.provisional import design_without_place, sample_near_target, with_adjusted_sample
+from pipeline.adjustment.provisional import (
+    design_without_place,
+    sample_near_target,
+    uncertain_wet_faces,
+    with_adjusted_sample,
+)
 from pipeline.artefacts.catalogue.points import (
     GEOREFERENCE_COUNTS,
     INS_SIGMAS,
@@ -169,7 +174,8 @@ def provisional_problem(
     )
     if config.mbes is not None:
         problem = sonar_problem(session, mount, {"laser": laser, "mbes": config.mbes})
-        return replace(problem, prior=replace(problem.prior, surfaces=design_without_place(context.model)))
+        problem = replace(problem, prior=replace(problem.prior, surfaces=design_without_place(context.model)))
+        return uncertain_wet_faces(problem, config.as_built)
     assert config.laser_fit is not None
     set_up = surveyed_displacement(context.target.frame, context.target.azimuth_correction_rad)
     return laser_problem(session, mount, laser, config.laser_fit, set_up)

@@ -17,8 +17,14 @@ from pipeline.adjustment.iteration import IterationSettings, WeightedIteration, 
 from pipeline.adjustment.problem import CalibrationProblem, designed_planes
 from pipeline.artefacts.sampling import sample_rows
 from pipeline.artefacts.streams import Batch, MemoryPart, Stream, point_array
+from pipeline.config.stage_settings import FacesAsBuilt
 from pipeline.maths.adjustment.pose_errors import N_POSE
-from pipeline.maths.adjustment.pseudo_observations import N_DISPLACEMENT, DesignPrior, displacement
+from pipeline.maths.adjustment.pseudo_observations import (
+    N_DISPLACEMENT,
+    DesignPrior,
+    ParameterPrior,
+    displacement,
+)
 from pipeline.maths.geometry.rotations import exp_so3, log_so3
 from pipeline.maths.target.model import TargetModel
 from pipeline.target.gate import fitting_gate_m
@@ -43,6 +49,26 @@ def design_without_place(target: TargetModel) -> DesignPrior:
     open_place = np.full(N_DISPLACEMENT, np.inf)
     sigmas = (FOUND_RAD, FOUND_M) if target.found else (BUILT_RAD, BUILT_M)
     return DesignPrior(designed_planes(target), *sigmas, np.zeros(N_DISPLACEMENT), open_place)
+
+
+def uncertain_wet_faces(problem: CalibrationProblem, as_built: FacesAsBuilt) -> CalibrationProblem:
+    """Return the problem with shifts and turns of the wet faces as unknowns, if these may stand far off the dry ones.
+
+    Two wet walls that are turned against each other by 0.2° fit the dry ones only if the INS drifts by centimetres.
+    Where they must fit, the provisional adjustment drifts so, and takes labels away with it.
+    """
+    if as_built.offset_sigma_m <= BUILT_M and as_built.angle_sigma_deg <= np.degrees(BUILT_RAD):
+        return problem
+    lean, state = float(np.radians(as_built.angle_sigma_deg)), problem.model.coarse
+    sigmas = {"_shift": as_built.offset_sigma_m, "_turn_1": lean, "_turn_2": lean}
+    wet = {
+        number: sigma
+        for number, name in enumerate(state.names)
+        for ending, sigma in sigmas.items()
+        if name.startswith("wet_") and name.endswith(ending) and sigma > 0
+    }
+    prior = ParameterPrior(np.array(list(wet)), np.diag(np.square(list(wet.values()))), state)
+    return replace(problem, prior=replace(problem.prior, parameters=prior))
 
 
 def sample_near_target(stream: Stream, name: str, count: float, context: LabellingContext) -> Batch:
@@ -110,7 +136,7 @@ def with_adjusted_sample(
         if number < ROUNDS:  # enough to label by: white noise of single records takes half the time
             noise = replace(problem.prior.noise, white=np.zeros(N_POSE))
             problem = replace(problem, prior=replace(problem.prior, noise=noise))
-        adjustment = weighted_iteration(problem, labelled, settings, gap_s)
+        adjustment = weighted_iteration(problem, labelled, settings, gap_s, with_known=True)
         if adjustment.deficient or not adjustment.settled:
             continue
         corrected = corrected_context(context, adjustment)
