@@ -9,7 +9,7 @@ from typing import Annotated
 import numpy as np
 import pandas as pd
 
-from pipeline.adjustment.consider import known_parameters, sonar_errors
+from pipeline.adjustment.consider import known_parameters, sonar_errors, wet_faces_uncertain
 from pipeline.adjustment.ins_drift import drift_model, drift_prior, pose_noise
 from pipeline.adjustment.iteration import MountAdjustment, adjust_mount
 from pipeline.adjustment.laser_design import laser_consider, laser_problem, surveyed_displacement
@@ -149,7 +149,9 @@ def calibration_problem(session: SessionData, inputs: Inputs, config: Config) ->
         state = problem.model.coarse
         errors = sonar_errors(problem.model.names, laser, config.mbes, as_built, session.target.depth_m)
         known = known_parameters(state, errors, config.adjust.free)
-        return replace(problem, prior=replace(problem.prior, parameters=known), consider=errors)
+        uncertain = wet_faces_uncertain(as_built.offset_sigma_m, as_built.angle_sigma_deg)
+        prior = replace(problem.prior, parameters=known, from_start=uncertain)
+        return replace(problem, prior=prior, consider=errors)
     assert config.laser_fit is not None
     pose = target_frame(inputs.target_pose), float(np.radians(inputs.target_pose["azimuth_correction_deg"].iloc[0]))
     problem = laser_problem(session, mount_of(laser.mount), laser, config.laser_fit, surveyed_displacement(*pose))

@@ -24,6 +24,7 @@ from pipeline.maths.mount_parameters import N_MOUNT
 Array = NDArray[np.float64]
 LEAST_SPAN_M = 0.1  # smallest depth and smallest span that count
 LASER_MOUNT = LASER_PARAMETERS[:N_MOUNT]
+BUILT_DEG, BUILT_M = 0.02, 0.002  # sigmas of a family's direction and place against the design
 ESTIMATED_WITH_PRIOR = (  # beginnings of the names
     "wet_", "mbes_range", "mbes_incidence", "mbes_level_range", "laser_incidence", "projector_",
     "sound_speed_gradient",
@@ -55,6 +56,14 @@ def gradient_sigma(mbes: Mbes, depth_m: float | None) -> float:
     depth = last if depth_m is None else max(depth_m, LEAST_SPAN_M)
     span = max(min(last, depth) - first, LEAST_SPAN_M)
     return float(np.hypot(np.sqrt(2) * mbes.svp_sigma_m_s / span, max(1 - span / depth, 0.0) * without_cast))
+
+
+def wet_faces_uncertain(offset_sigma_m: float, angle_sigma_deg: float) -> bool:
+    """Return whether wet faces may stand farther off the dry ones than on an ordinary building site.
+
+    Then the search for weights must know of them: else the INS's drift makes up for what does not fit.
+    """
+    return offset_sigma_m > BUILT_M or angle_sigma_deg > BUILT_DEG
 
 
 def laser_errors(names: Sequence[str], laser: Laser, as_built: AsBuilt) -> ConsiderErrors:

@@ -211,22 +211,18 @@ class WeightedIteration:
 
 
 def weighted_iteration(
-    problem: CalibrationProblem,
-    streams: Mapping[str, Stream],
-    settings: IterationSettings,
-    gap_s: float,
-    with_known: bool = False,
+    problem: CalibrationProblem, streams: Mapping[str, Stream], settings: IterationSettings, gap_s: float
 ) -> WeightedIteration:
     """Read all points, solve and step, until the weights do not change, or a direction is open.
 
     Without points of the calibrated sensor, surfaces and drift alone are estimated. Parameters: as for
-    :func:`adjust_mount`; ``with_known``: also estimate the parameters that are known beforehand.
+    :func:`adjust_mount`.
     """
     model, prior = problem.model, problem.prior
     state = initial_mount(streams["mbes"], model) if "mbes" in streams else model.coarse
     values = CurrentValues(state, weighting=Weighting(white=prior.noise.white))
     estimated = np.array(estimated_columns(state, settings.free, mount=state.calibrated in streams))
-    estimated = np.union1d(estimated, prior.known_parameters) if with_known else estimated
+    estimated = np.union1d(estimated, prior.known_parameters) if prior.from_start else estimated
     iteration = 0
     while True:
         iteration += 1

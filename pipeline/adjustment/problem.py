@@ -67,13 +67,15 @@ class PriorInformation:
 
     noise: white noise and drift of the recorded poses; surfaces: pseudo-observations of the surfaces; drift: how well
     the figures of the drift in ``noise`` are known; parameters: the values known beforehand of parameters that are
-    estimated.
+    estimated; from_start: whether these are estimated from the first step on, because they may be so large that the
+    weights must not be found without them; otherwise with the last weights.
     """
 
     noise: PoseNoise
     surfaces: Prior | None = None
     drift: DriftPrior = EXACT
     parameters: ParameterPrior | None = None
+    from_start: bool = False
 
     @property
     def priors(self) -> tuple[Prior, ...]:

@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
+from pipeline.adjustment.consider import BUILT_DEG, BUILT_M, wet_faces_uncertain
 from pipeline.adjustment.iteration import IterationSettings, WeightedIteration, weighted_iteration
 from pipeline.adjustment.problem import CalibrationProblem, designed_planes
 from pipeline.artefacts.sampling import sample_rows
@@ -35,7 +36,7 @@ READ = 1_000_000  # about this many points of a stream are looked at
 SAMPLE = {"laser_pool": 60_000, "soundings_pool": 20_000}  # about this many of them near the target are used
 LEAST_KEPT = 0.8  # of the labelled points of each sensor, by an adjusted mount that is better
 BEYOND_M = 0.5  # a point farther outside the target's bounds is not near it
-BUILT_RAD, BUILT_M = float(np.radians(0.02)), 0.002  # sigmas of a family's direction and place against the design
+BUILT_RAD = float(np.radians(BUILT_DEG))
 FOUND_RAD, FOUND_M = float(np.radians(0.3)), 0.03  # against planes that were found in laser points: of the INS's drift
 SENSOR = {"laser_labelled": "laser", "soundings_labelled": "mbes"}  # by the name of the labelled stream
 
@@ -57,7 +58,7 @@ def uncertain_wet_faces(problem: CalibrationProblem, as_built: FacesAsBuilt) -> 
     Two wet walls that are turned against each other by 0.2° fit the dry ones only if the INS drifts by centimetres.
     Where they must fit, the provisional adjustment drifts so, and takes labels away with it.
     """
-    if as_built.offset_sigma_m <= BUILT_M and as_built.angle_sigma_deg <= np.degrees(BUILT_RAD):
+    if not wet_faces_uncertain(as_built.offset_sigma_m, as_built.angle_sigma_deg):
         return problem
     lean, state = float(np.radians(as_built.angle_sigma_deg)), problem.model.coarse
     sigmas = {"_shift": as_built.offset_sigma_m, "_turn_1": lean, "_turn_2": lean}
@@ -68,7 +69,7 @@ def uncertain_wet_faces(problem: CalibrationProblem, as_built: FacesAsBuilt) -> 
         if name.startswith("wet_") and name.endswith(ending) and sigma > 0
     }
     prior = ParameterPrior(np.array(list(wet)), np.diag(np.square(list(wet.values()))), state)
-    return replace(problem, prior=replace(problem.prior, parameters=prior))
+    return replace(problem, prior=replace(problem.prior, parameters=prior, from_start=True))
 
 
 def sample_near_target(stream: Stream, name: str, count: float, context: LabellingContext) -> Batch:
@@ -136,7 +137,7 @@ def with_adjusted_sample(
         if number < ROUNDS:  # enough to label by: white noise of single records takes half the time
             noise = replace(problem.prior.noise, white=np.zeros(N_POSE))
             problem = replace(problem, prior=replace(problem.prior, noise=noise))
-        adjustment = weighted_iteration(problem, labelled, settings, gap_s, with_known=True)
+        adjustment = weighted_iteration(problem, labelled, settings, gap_s)
         if adjustment.deficient or not adjustment.settled:
             continue
         corrected = corrected_context(context, adjustment)
