@@ -9,6 +9,7 @@ from pipeline.language import chosen
 from pipeline.maths.target.face import Face
 from pipeline.maths.target.family_words import families_in_words
 from pipeline.maths.target.model import Family, TargetModel
+from pipeline.maths.target.outlines import Outline, build_target
 from pipeline.results.pages.drift_words import drift_rows, drift_sentence
 from pipeline.results.pages.patent_check import patent_check
 from pipeline.target.design import target_of
@@ -141,6 +142,18 @@ def test_a_face_across_the_boat_is_told_to_be() -> None:
     words = families_in_words(TargetModel((), (wall, corner), (), 0.0, None))
     assert "left: 1 face across the boat, straight towards it; " in words
     assert words.endswith("corner: 1 face across the boat, turned 45° ahead (+y)")
+
+
+@pytest.mark.parametrize(("pieces", "told"), [(3, "bottom-3: 1 face, horizontal"), (4, "; 4 more that the sonar")])
+def test_many_pieces_of_the_bottom_are_only_counted(pieces: int, told: str) -> None:
+    wall = Outline("wall", [(0, 2, -3), (0, -2, -3), (0, -2, 2), (0, 2, 2)])
+    squares = [
+        Outline(f"bottom-{k}", [(-3, k, -4), (-2, k, -4), (-2, k + 0.9, -4), (-3, k + 0.9, -4)], seen="wet")
+        for k in range(1, pieces + 1)
+    ]
+    words = families_in_words(build_target([wall, *squares], [], 0.0, None))
+    assert told in words
+    assert ("bottom-1" in words) == (pieces < 4)
 
 
 # --- the screen ------------------------------------------------------------------------------------------------------

@@ -4,6 +4,7 @@ import numpy as np
 
 from pipeline.maths.target.model import Family, TargetModel, names_in_order
 
+MANY = 4  # families of wet faces alone, such as pieces of the bottom: from so many on they are only counted
 ACROSS_DEG = 95.0  # a face turned by more looks at the boat from its other side
 STRAIGHT_DEG = 10.0  # a face turned, or leaning, by less looks straight at the boat that passes
 
@@ -16,7 +17,11 @@ def families_in_words(model: TargetModel) -> str:
     +y, astern toward -y. One turned by more than a right angle stands across the boat. It looks up by asin(n_z), down
     if that is negative. Families of one face and of several are told alike; horizontal ones are tops and bottoms.
     """
-    parts = (f"{family.name}: {_faces(family)}" for family in names_in_order(model.families))
+    families = names_in_order(model.families)
+    alone = [family for family in families if model.faces and all(model.faces[k].seen == "wet" for k in family.faces)]
+    few = len(alone) < MANY
+    parts = [f"{family.name}: {_faces(family)}" for family in families if few or family not in alone]
+    parts += [] if few else [f"{len(alone)} more that the sonar alone sees"]
     return f"Faces, as seen from the passing boat: {'; '.join(parts)}"
 
 

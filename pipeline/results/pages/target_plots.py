@@ -157,7 +157,9 @@ def distance_charts(residuals: pd.DataFrame, faces: pd.DataFrame, family: NDArra
     solved
         Whether the adjustment has a result to show.
     """
-    names = [name for name in family_names(faces) if (family == name).any()][:MOST_PANELS]
+    by_laser = (residuals["sensor"] == "laser").to_numpy()
+    both = by_laser if by_laser.any() else np.ones(len(by_laser), dtype=bool)  # what goes on from one to the other
+    names = [name for name in family_names(faces) if ((family == name) & both).any()][:MOST_PANELS]
     level = horizontal_families(faces)
     names = names or family_names(faces)[:1]
     clouds = CLOUDS[_calibrated(residuals)][: None if solved else -1]  # the last is the calibrated one
