@@ -23,6 +23,7 @@ import yaml
 from pipeline.config.pool import AsBuilt
 from pipeline.config.yaml_models import parse
 from pipeline.maths.comparison import mount_error
+from pipeline.report.reason_codes import WEAK_ALONE
 from pipeline.simulation.scenario import Scenario
 from pipeline.target.design import target_of
 from tools.campaign_files import collect_rows
@@ -136,7 +137,6 @@ The normalised squared error (NSE) by the total covariance is 6 in the mean if t
 test or a search says that something is wrong is rejected, and its NSE stands in the last column but one, not in the
 first. "Plan" is the total sigma that `poolcal plan` predicts for the same passes at the first session's faces.
 """
-SIGMAS_ALONE = {"sigma_above_limit", "soundings_above_limit"}
 
 
 def summary(table: pd.DataFrame) -> str:
@@ -154,7 +154,7 @@ def summary(table: pd.DataFrame) -> str:
 def _line(place: str, rows: pd.DataFrame) -> str:
     codes = rows["codes"].fillna("no_result")
     accepted = rows["verdict"] == "accepted"
-    weak = ~accepted & codes.map(lambda words: set(words.split()) <= SIGMAS_ALONE)
+    weak = ~accepted & codes.map(lambda words: set(words.split()) <= WEAK_ALONE)
     honest, others = rows[accepted | weak], rows[~(accepted | weak)]
     errors, totals, planned = (
         part[[f"{kind}_{name}" for name in NAMES]].to_numpy(float)
@@ -164,7 +164,7 @@ def _line(place: str, rows: pd.DataFrame) -> str:
     worst = np.abs(errors / rows.loc[accepted, [f"total_{name}" for name in NAMES]].to_numpy(float))
     medians = np.median(totals, axis=0) if len(honest) else np.full(len(NAMES), np.nan)
     against = (medians / planned)[0]
-    reasons = ", ".join(sorted({word for words in codes[others.index] for word in words.split()} - SIGMAS_ALONE))
+    reasons = ", ".join(sorted({word for words in codes[others.index] for word in words.split()} - WEAK_ALONE))
     cells = (
         place, f"{int(accepted.sum())} of {len(rows)}", str(int(weak.sum())),
         f"{honest['nse_total'].mean():.1f} ({low:.1f} to {high:.1f})", f"{worst.max():.1f}" if len(worst) else "",

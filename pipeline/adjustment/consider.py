@@ -66,6 +66,15 @@ def wet_faces_uncertain(offset_sigma_m: float, angle_sigma_deg: float) -> bool:
     return offset_sigma_m > BUILT_M or angle_sigma_deg > BUILT_DEG
 
 
+def wet_sigmas(
+    names: Sequence[str], offset_sigma_m: float, angle_sigma_deg: float, bow_sigma_m: float = 0.0
+) -> dict[str, float]:
+    """Return the sigmas of the wet faces' shifts, turns and bows against the dry ones, m and rad, by parameter."""
+    lean = float(np.radians(angle_sigma_deg))
+    of_wet = {"turn_1": lean, "turn_2": lean, "shift": offset_sigma_m, "bow": bow_sigma_m}
+    return {name: sigma for name in names for end, sigma in of_wet.items() if re.fullmatch(f"wet_.*_{end}", name)}
+
+
 def laser_errors(names: Sequence[str], laser: Laser, as_built: AsBuilt) -> ConsiderErrors:
     """Return the a-priori errors of the laser and of the wet faces, and zero for all other parameters.
 
@@ -87,10 +96,8 @@ def laser_errors(names: Sequence[str], laser: Laser, as_built: AsBuilt) -> Consi
     sigmas = dict(zip(LASER_MOUNT, mount_sigmas, strict=True))
     sigmas |= {"laser_range": laser.range_bias_sigma_m, "laser_latency": laser.latency_sigma_s}
     sigmas["laser_incidence"] = laser.incidence_bias_sigma_m
-    lean = float(np.radians(as_built.angle_sigma_deg))
-    of_wet = {"turn_1": lean, "turn_2": lean, "shift": as_built.offset_sigma_m, "bow": as_built.bow_sigma_m}
     sigmas |= {name: as_built.face_sigma_m for name in names if name.startswith("face_")}
-    sigmas |= {name: sigma for name in names for end, sigma in of_wet.items() if re.fullmatch(f"wet_.*_{end}", name)}
+    sigmas |= wet_sigmas(names, as_built.offset_sigma_m, as_built.angle_sigma_deg, as_built.bow_sigma_m)
     blocks = []
     if covariance is not None and LASER_MOUNT[0] in names:
         blocks = [(np.array([names.index(name) for name in LASER_MOUNT]), np.array(covariance))]

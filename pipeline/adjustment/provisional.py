@@ -13,19 +13,15 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from pipeline.adjustment.consider import BUILT_DEG, BUILT_M, wet_faces_uncertain
+from pipeline.adjustment.consider import BUILT_DEG, BUILT_M, known_parameters, wet_faces_uncertain, wet_sigmas
 from pipeline.adjustment.iteration import IterationSettings, WeightedIteration, weighted_iteration
 from pipeline.adjustment.problem import CalibrationProblem, designed_planes
 from pipeline.artefacts.sampling import sample_rows
 from pipeline.artefacts.streams import Batch, MemoryPart, Stream, point_array
 from pipeline.config.stage_settings import FacesAsBuilt
 from pipeline.maths.adjustment.pose_errors import N_POSE
-from pipeline.maths.adjustment.pseudo_observations import (
-    N_DISPLACEMENT,
-    DesignPrior,
-    ParameterPrior,
-    displacement,
-)
+from pipeline.maths.adjustment.pseudo_observations import N_DISPLACEMENT, DesignPrior, displacement
+from pipeline.maths.adjustment.solution import ConsiderErrors
 from pipeline.maths.geometry.rotations import exp_so3, log_so3
 from pipeline.maths.target.model import TargetModel
 from pipeline.target.gate import fitting_gate_m
@@ -60,16 +56,11 @@ def uncertain_wet_faces(problem: CalibrationProblem, as_built: FacesAsBuilt) -> 
     """
     if not wet_faces_uncertain(as_built.offset_sigma_m, as_built.angle_sigma_deg):
         return problem
-    lean, state = float(np.radians(as_built.angle_sigma_deg)), problem.model.coarse
-    sigmas = {"_shift": as_built.offset_sigma_m, "_turn_1": lean, "_turn_2": lean}
-    wet = {
-        number: sigma
-        for number, name in enumerate(state.names)
-        for ending, sigma in sigmas.items()
-        if name.startswith("wet_") and name.endswith(ending) and sigma > 0
-    }
-    prior = ParameterPrior(np.array(list(wet)), np.diag(np.square(list(wet.values()))), state)
-    return replace(problem, prior=replace(problem.prior, parameters=prior, from_start=True))
+    state = problem.model.coarse
+    sigmas = wet_sigmas(state.names, as_built.offset_sigma_m, as_built.angle_sigma_deg)
+    errors = ConsiderErrors(np.array([sigmas.get(name, 0.0) for name in state.names]))
+    known = known_parameters(state, errors, ())
+    return replace(problem, prior=replace(problem.prior, parameters=known, from_start=True))
 
 
 def sample_near_target(stream: Stream, name: str, count: float, context: LabellingContext) -> Batch:

@@ -68,19 +68,27 @@ def trajectory_in_target(poses: pd.DataFrame, target_pose: pd.DataFrame) -> Traj
     return target_frame(target_pose).trajectory_from_pool(trajectory_in_pool(poses))
 
 
-def trajectory_without_drift(trajectory: Trajectory, drift: pd.DataFrame) -> Trajectory:
-    """Return a trajectory in the target frame, corrected by the slow errors of the table ``drift``: p + δ, Exp(ω) R.
+def slow_errors(drift: pd.DataFrame, t_ns: NDArray[np.int64]) -> tuple[Array, Array]:
+    """Return the shifts δ (n, 3) m and turns ω (n, 3) rad of recorded poses by the table ``drift``, target frame.
 
-    Between two knots the errors are linear; without knots the trajectory stays.
+    Between two knots they are linear; without knots they are zero.
     """
     if not len(drift):
-        return trajectory
-    start = trajectory.t_ns[0]
-    since, knots = ((times - start).astype(np.float64) for times in (trajectory.t_ns, drift["t_ns"].to_numpy()))
-    names = [*(f"{axis}_target_m" for axis in "xyz"), *(f"turn_{axis}_target_deg" for axis in "xyz")]
-    errors = np.column_stack([np.interp(since, knots, drift[name].to_numpy()) for name in names])
-    R_target_from_body = exp_so3(np.radians(errors[:, 3:])) @ trajectory.R_frame_from_body
-    return Trajectory.build(trajectory.t_ns, trajectory.positions_m + errors[:, :3], R_target_from_body)
+        return np.zeros((len(t_ns), 3)), np.zeros((len(t_ns), 3))
+    knots = drift["t_ns"].to_numpy()
+    since, at = ((times - knots[0]).astype(np.float64) for times in (t_ns, knots))
+    names = [f"{axis}_target_m" for axis in "xyz"], [f"turn_{axis}_target_deg" for axis in "xyz"]
+    shift, turn = (
+        np.column_stack([np.interp(since, at, drift[name].to_numpy()) for name in columns]) for columns in names
+    )
+    return shift, np.radians(turn)
+
+
+def trajectory_without_drift(trajectory: Trajectory, drift: pd.DataFrame) -> Trajectory:
+    """Return a trajectory in the target frame, corrected by the table ``drift``: p + δ, Exp(ω) R."""
+    shift, turn = slow_errors(drift, trajectory.t_ns)
+    R_target_from_body = exp_so3(turn) @ trajectory.R_frame_from_body
+    return Trajectory.build(trajectory.t_ns, trajectory.positions_m + shift, R_target_from_body)
 
 
 def family_names(faces: pd.DataFrame) -> list[str]:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pipeline.artefacts.catalogue.points import POSES
 from pipeline.artefacts.catalogue.results import DRIFT, SURFACES
 from pipeline.artefacts.catalogue.target import FACES, LASER_LABELLED, SOUNDINGS_LABELLED, TARGET_POSE
-from pipeline.artefacts.from_tables import normal_of, trajectory_in_target
+from pipeline.artefacts.from_tables import normal_of, slow_errors, trajectory_in_target
 from pipeline.artefacts.schema import Artefact
 from pipeline.artefacts.streams import Batch, point_array
 from pipeline.config.session import Calibrated
@@ -121,15 +121,8 @@ class CalibratedPoints:
 
     def _slow_error(self, t_ns: NDArray[np.int64], recorded: Array) -> Array:
         """Return the change (n, 3) m of points by the slow errors of the poses: δ + ω × r."""
-        if not len(self.drift):
-            return np.zeros_like(recorded)
+        shift, turn = slow_errors(self.drift, t_ns)
         start = self.trajectory.t_ns[0]
-        since, knots = ((times - start).astype(np.float64) for times in (t_ns, self.drift["t_ns"].to_numpy()))
-        names = [f"{axis}_target_m" for axis in "xyz"], [f"turn_{axis}_target_deg" for axis in "xyz"]
-        shift, turn = (
-            np.column_stack([np.interp(since, knots, self.drift[name].to_numpy()) for name in columns])
-            for columns in names
-        )
-        records = (self.trajectory.t_ns - start).astype(np.float64)
+        since, records = ((times - start).astype(np.float64) for times in (t_ns, self.trajectory.t_ns))
         ins = np.column_stack([np.interp(since, records, column) for column in self.trajectory.positions_m.T])
-        return np.asarray(shift + np.cross(np.radians(turn), recorded - ins))
+        return np.asarray(shift + np.cross(turn, recorded - ins))

@@ -11,7 +11,7 @@ mount that placed them may be wrong by.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from pipeline.maths.surfaces.flatness import cells_of, flatness
 
 Array = NDArray[np.float64]
 SIDE_M, MARGIN_M, CELL_M = 2.0, 0.1, 0.25  # of a square; its face is smaller by the margin on each side
-DEEPEST_M = 0.5  # a piece lies so far below the water, or deeper
+SHALLOWEST_M = 0.5  # a piece lies so far below the water, or deeper
 FEWEST, FEWEST_OF_PASS = 1000, 300  # soundings of a square; of a pass that counts
 FEWEST_OF_CELL = 4
 FITS, WIDE, LEAST_OFF_M = 4, 3.0, 0.03  # fits to what lies within so many RMS of the last one, or so near
@@ -59,7 +59,7 @@ def bottom_pieces(points_m: Array, number_of_pass: NDArray[np.int16], level_m: f
     level_m
         Height of the water.
     """
-    deep = np.flatnonzero(points_m[:, 2] < level_m - DEEPEST_M)
+    deep = np.flatnonzero(points_m[:, 2] < level_m - SHALLOWEST_M)
     keys, square, count = cells_of(points_m[deep, :2], SIDE_M)
     order = np.argsort(square, kind="stable")
     ends = np.cumsum(count)
@@ -98,7 +98,7 @@ def _piece(points_m: Array, number_of_pass: NDArray[np.int16], low_m: Array, lev
         uneven_m=_unevenness(places, away[on]),
         apart_m=float(np.ptp(means)) if means else 0.0,
     )
-    return BottomPiece(**{**vars(made), "refused": _refusal(made, flat.bow_m, flat.covered)})
+    return replace(made, refused=_refusal(made, flat.bow_m, flat.covered))
 
 
 def _plane(points_m: Array) -> Array:

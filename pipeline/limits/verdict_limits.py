@@ -15,7 +15,7 @@ from pipeline.maths.survey.mount_limits import largest_share, sigmas_alone
 from pipeline.maths.survey.sounding_uncertainty import EXCLUSIVE, SPECIAL, Order
 
 Array = NDArray[np.float64]
-ORDERS = {  # by purpose; the pool's limits have no order, and serve every survey
+BY_PURPOSE = {  # orders of survey; the pool's limits have no order, and serve every survey
     "construction": Order("construction", 0.10, 0.0075, 0.5),  # no order of S-44: poolcal's own
     "exclusive_order": EXCLUSIVE,
     "special_order": SPECIAL,
@@ -36,7 +36,7 @@ def limits_of(verdict: VerdictLimits, calibrated: Calibrated) -> VerdictLimits:
 
 def order_of(verdict: VerdictLimits) -> Order | None:
     """Return the order of survey by which soundings are judged; None for the pool's limits."""
-    return ORDERS.get(verdict.purpose)
+    return BY_PURPOSE.get(verdict.purpose)
 
 
 def largest_sigmas(verdict: VerdictLimits) -> Array:

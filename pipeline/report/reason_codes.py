@@ -86,6 +86,9 @@ class ReasonCode(StrEnum):
     RAYS_TRACED_WITH_WRONG_MOUNT = "rays_traced_with_wrong_mount", "rays were traced with a mount that is far off"
 
 
+WEAK_ALONE = frozenset({ReasonCode.SIGMA_ABOVE_LIMIT, ReasonCode.SOUNDINGS_ABOVE_LIMIT})  # too weak, and not wrong
+
+
 @dataclass(frozen=True)
 class Statement:
     """One reason or warning: a stable code for programs, and words for people."""

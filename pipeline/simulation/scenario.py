@@ -97,7 +97,8 @@ class Scenario(Model):
                 f"track.ins_height_m = {height_m} puts the sonar {height_m + self.mbes.mount.z_m:.2f} m and the laser "
                 f"{height_m + self.laser.mount.z_m:.2f} m above the water: it must be 0.2 m below, and 0.2 m above"
             )
-        way_m = min(2 * self.half_length_m, 2 * pi * self.track.circle_radius_m)
+        ways_m = {"circle": 2 * pi * self.track.circle_radius_m}
+        way_m = min(ways_m.get(course, 2 * self.half_length_m) for course in self.track.courses)
         if way_m / self.track.speed_m_s < 1.0:
             raise ValueError(f"track.speed_m_s = {self.track.speed_m_s}: a pass must last a second or more")
         return self

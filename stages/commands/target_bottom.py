@@ -23,6 +23,7 @@ from pipeline.georeference.pool_context import PoolContext, pool_frame_of
 from pipeline.language.speaking import say
 from pipeline.maths.target.model import TargetModel
 from pipeline.readers.dispatch import raw_parts
+from pipeline.report.reason_codes import WEAK_ALONE
 from pipeline.results.finished_run import FinishedRun
 from pipeline.run.output_files import refuse_output
 from pipeline.run.results import Tables
@@ -33,7 +34,6 @@ from pipeline.text_table import text_table
 from stages import ORDER
 
 AWAY_M = 0.7  # of a sounding from the target's faces
-FEW = frozenset({"sigma_above_limit", "soundings_above_limit"})  # a run so rejected has a mount that is right, if weak
 
 
 def command(folder: Path, run_folder: Path, out: Path | None, jobs: int | None) -> int:
@@ -75,7 +75,7 @@ def _target(run: FinishedRun, folder: Path) -> Faces:
         raise ConfigError(f"{where}: is of the session {run.settings.session_folder}; name a run of {folder}")
     if not isinstance(target, Faces):
         raise ConfigError(f"{where}: its target has letters, which determine all without the bottom; it takes faces")
-    grave = [code for code in run.result["reason_codes"] if code not in FEW]
+    grave = [code for code in run.result["reason_codes"] if code not in WEAK_ALONE]
     if grave or run.result["methods"]["adjustment"]["mount"] is None:
         raise ConfigError(
             f"{where}: was rejected for {', '.join(dict.fromkeys(grave))}: its mount may be wrong, and would put the "

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from pipeline.artefacts.from_tables import trajectory_in_target
+from tests.support.docks import of_faces
 from tests.support.simulated import calibrated, made, without_biases
 
 MOUNT = {"roll_deg": -1.8, "pitch_deg": 1.2, "yaw_deg": -2.0, "x_m": 0.30, "y_m": 0.20, "z_m": -2.01}
@@ -19,16 +20,8 @@ RANGE_M, ANGLE_RAD = 0.008, np.radians(0.06)  # the sonar's noise
 def session(faces: dict[str, Any], drift: bool) -> Any:
     """A wall, a return and a bottom, passed both ways at two distances; without drift the INS is free from errors."""
     still = {"ins": {"white": {"position_m": 0.0, "attitude_deg": 0.0}}}
-    target = {
-        "kind": "faces",
-        "origin": {"latitude_deg": 36.0, "longitude_deg": 120.1, "height_m": 12.0},
-        "azimuth_deg": 20.0,
-        "faces": faces,
-    }
     track = {"distances_m": [4.0, 4.0, 7.0, 7.0], "courses": ["along", "back"], "half_length_m": 6.0}
-    blocks = {
-        "target": target,
-        "surroundings": {"back_wall": False},
+    blocks = of_faces(faces) | {
         "track": track,
         "laser": {"field_deg": [-130.0, 130.0]},
         "mbes": {"mount": MOUNT, "sector_deg": 140.0, "ping_rate_hz": 5.0, "point_beams": True, "corner_share": 0.0,

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.support.docks import of_faces
 from tests.support.simulated import QUIET, calibrated, made, without_biases
 
 EXACT_DEG, EXACT_MM = 1e-4, 0.01
@@ -19,20 +20,14 @@ PORT: dict[str, Any] = {
     "laser": {"field_deg": [-130.0, -30.0]},
     "track": {"courses": ["back"]},
 }
-LOCK: dict[str, Any] = {  # a wall with a niche, and across the boat one that leans back
-    "target": {
-        "kind": "faces",
-        "origin": {"latitude_deg": 36.0, "longitude_deg": 120.1, "height_m": 12.0},
-        "azimuth_deg": 163.0,
-        "faces": {
-            "right": {"corners": [[0, 4, -4], [0, -4, -4], [0, -4, 2], [0, 4, 2]]},
-            "niche": {"corners": [[1.5, 5.5, -4], [0, 4, -4], [0, 4, 2], [1.5, 5.5, 2]]},
-            "left": {"corners": [[-9, -4, -4], [-9, 4, -4], [-12, 4, 2], [-12, -4, 2]]},
-        },
+LOCK: dict[str, Any] = of_faces(  # a wall with a niche, and across the boat one that leans back
+    {
+        "right": {"corners": [[0, 4, -4], [0, -4, -4], [0, -4, 2], [0, 4, 2]]},
+        "niche": {"corners": [[1.5, 5.5, -4], [0, 4, -4], [0, 4, 2], [1.5, 5.5, 2]]},
+        "left": {"corners": [[-9, -4, -4], [-9, 4, -4], [-12, 4, 2], [-12, -4, 2]]},
     },
-    "surroundings": {"back_wall": False},
-    "track": {"distances_m": [4.0, 5.0, 6.0, 7.0], "half_length_m": 6.0, "courses": ["along", "back"]},
-}
+    azimuth_deg=163.0,
+) | {"track": {"distances_m": [4.0, 5.0, 6.0, 7.0], "half_length_m": 6.0, "courses": ["along", "back"]}}
 COURSES: dict[str, tuple[dict[str, Any], ...]] = {
     "to port": (PORT,),
     "both ways": (WIDE, {"track": {"courses": ["along", "back"]}}),

@@ -18,9 +18,9 @@ def families_in_words(model: TargetModel) -> str:
     if that is negative. Families of one face and of several are told alike; horizontal ones are tops and bottoms.
     """
     families = names_in_order(model.families)
-    alone = [family for family in families if model.faces and all(model.faces[k].seen == "wet" for k in family.faces)]
+    alone = {one.name for one in families if model.faces and all(model.faces[k].seen == "wet" for k in one.faces)}
     few = len(alone) < MANY
-    parts = [f"{family.name}: {_faces(family)}" for family in families if few or family not in alone]
+    parts = [f"{family.name}: {_faces(family)}" for family in families if few or family.name not in alone]
     parts += [] if few else [f"{len(alone)} more that the sonar alone sees"]
     return f"Faces, as seen from the passing boat: {'; '.join(parts)}"
 
