@@ -21,6 +21,10 @@ STRAIGHT_DEG = 5.0  # largest swing of the heading on a straight pass; a boat th
 TWICE = 2  # number of further passes at such a distance
 VAGUE = 1.0  # rad or m: prior sigma of every parameter
 SIDES = {"P1": "the faces on the -y side (P1)", "P3": "the faces on the +y side (P3)", "P2": "the wall (P2)"}
+ONE_WALL = (
+    "both sensors see one wall alone: pitch, yaw and lever arm y rest on the boat's unrest; pass a corner, a recess or "
+    "stairs, too, turned from it by 30° to 60°, or go to a place that has one"
+)
 HORIZONTAL = (
     "no horizontal face is seen by both sensors: only the boat's rolling and pitching determine the sonar's height, "
     "and a still boat leaves it open"
@@ -124,7 +128,7 @@ def _gaps(coverage: Coverage) -> list[str]:
         (family,) = there
         side = SIDES.get(family, family).removesuffix(f" ({family})")
         return [f"the sonar sees {side} alone: its place along it and its height are undetermined"]
-    gaps = []
+    gaps = [ONE_WALL] if len(upright) == 1 and there == set(upright) else []
     missing = [SIDES.get(family, family) for family in upright if family not in there]
     if missing:
         gaps.append(f"the sonar sees nothing of {' and '.join(missing)}")

@@ -36,6 +36,20 @@ def sigmas(mount: dict[str, float], field_deg: tuple[float, float], *passes: dic
     return np.sqrt(np.diag(answer.given.total))
 
 
+def gaps(*names: str) -> list[str]:
+    """Gaps in the geometry of two passes, if of the dock these walls alone are there."""
+    target = DOCK["target"] | {"faces": {name: DOCK["target"]["faces"][name] for name in names}}
+    session = made(DOCK | {"target": target}, {"track": {"distances_m": [4.0]}}, seed=2)
+    plan = parse(Plan, {"laser": FIELD, "passes": [{"distance_m": 4.0}, {"distance_m": 7.0}]}, "plan")
+    configs = parse(PoolConfig, session.pool, "pool"), parse(SessionConfig, session.session, "session")
+    return assess_plan(plan, *configs).gaps
+
+
+def test_of_one_wall_alone_it_is_told_where_to_go() -> None:
+    assert gaps("wall")[0].startswith("both sensors see one wall alone: pitch, yaw and lever arm y rest on the boat's")
+    assert not any("one wall alone" in gap for gap in gaps("wall", "north"))
+
+
 def test_a_mirrored_pass_is_as_good() -> None:
     """The dock is its own mirror image: so a boat that is mirrored, too, and sails back, learns the same."""
     near, far = {"distance_m": 4.0}, {"distance_m": 7.0}
