@@ -26,6 +26,7 @@ from pipeline.maths.geometry.trajectory import GeodeticPoses, Trajectory, poses_
 from pipeline.maths.sonar.ray_tracing import Cast, trace
 from pipeline.maths.sonar.soundings import points_in_mbes, refracted_points
 from pipeline.mount import mount_of
+from tests.support.lidar_toolkit import dcm_nwu
 
 # x east, y north, z up from x north, y west, z up; and x starboard, y forward, z up from x forward, y port, z up.
 R_OURS_FROM_NWU = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
@@ -36,18 +37,6 @@ ROWS = (46, 92, 43, 164, 102, 60)
 
 
 # --- real boat rows: xn = pn + C(roll, pitch, heading) (B xs + a) ----------------------------------------------------
-def _dcm_nwu(roll: float, pitch: float, heading: float) -> np.ndarray:
-    """As written in LidarToolkit's getDCM (scripts/SphereCalibrationOctave), for angles and boresight alike."""
-    cr, sr, cp, sp, ch, sh = (f(a) for a in (roll, pitch, heading) for f in (np.cos, np.sin))
-    return np.array(
-        [
-            [cp * ch, cr * sh + sr * sp * ch, -sr * sh + cr * sp * ch],
-            [-cp * sh, ch * cr - sr * sp * sh, -sr * ch - cr * sp * sh],
-            [-sp, sr * cp, cr * cp],
-        ]
-    )
-
-
 @pytest.fixture(scope="module")
 def rows(data: Path) -> np.ndarray:
     tables = [np.fromfile(data / "georeferencing" / name, "<f8").reshape(-1, 22) for name in FILES]
@@ -57,7 +46,7 @@ def rows(data: Path) -> np.ndarray:
 
 def _solve(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Boresight and lever arm in LidarToolkit's frames: rotation and shift of one cloud onto the other (Kabsch)."""
-    C = np.array([_dcm_nwu(*rph) for rph in rows[:, 10:13]])
+    C = np.array([dcm_nwu(*rph) for rph in rows[:, 10:13]])
     body = np.einsum("nji,nj->ni", C, rows[:, 0:3] - rows[:, 16:19])
     scanner = rows[:, 4:7]
     u, _, vt = np.linalg.svd((body - body.mean(axis=0)).T @ (scanner - scanner.mean(axis=0)))
@@ -68,7 +57,7 @@ def _solve(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def test_lidar_toolkit_mount(rows: np.ndarray) -> None:
     B, a = _solve(rows)
     assert a == pytest.approx([-0.185596, 0.037658, 2.419063], abs=1e-6)
-    assert pytest.approx(_dcm_nwu(*np.radians([0.4395, -1.8681, 0.3992])), abs=2e-6) == B
+    assert pytest.approx(dcm_nwu(*np.radians([0.4395, -1.8681, 0.3992])), abs=2e-6) == B
 
 
 def test_lidar_toolkit_rows(rows: np.ndarray) -> None:
