@@ -1,22 +1,21 @@
 """The iteration of the adjustment: read all points, solve and step, until neither values nor weights change."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.adjustment.accumulation import Accumulation, accumulate, reweighted
-from pipeline.adjustment.initial_mount import initial_mount
+from pipeline.adjustment.accumulation import Accumulation
 from pipeline.adjustment.iterate import Iterate
 from pipeline.adjustment.observation_model import CurrentValues
 from pipeline.adjustment.problem import CalibrationProblem
+from pipeline.adjustment.two_starts import Rival, chosen_iteration
+from pipeline.adjustment.weighted_iteration import IterationSettings, StepLimits, is_small
 from pipeline.artefacts.streams import Stream
 from pipeline.maths.adjustment.drift_likelihood import DriftFigures
 from pipeline.maths.adjustment.eliminate_drift import NormalEquations
-from pipeline.maths.adjustment.normal_equations import Linearisation
 from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.ping_noise import PingNoise, ping_noise, with_ping_noise
 from pipeline.maths.adjustment.pose_errors import DriftEstimate
@@ -28,48 +27,12 @@ from pipeline.maths.adjustment.weighting import (
     noise_seen_by_laser,
     scatter,
 )
-from pipeline.maths.mount_parameters import N_MOUNT
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 
-class IterationSettings(Protocol):
-    """Settings of the iteration."""
-
-    @property
-    def free(self) -> Sequence[str]:
-        """Names of the additional parameters to estimate."""
-        ...
-
-    @property
-    def max_iterations(self) -> int:
-        """Largest number of readings of the points."""
-        ...
-
-    @property
-    def robust_k0(self) -> float:
-        """Largest normalised residual with full weight."""
-        ...
-
-    @property
-    def robust_k1(self) -> float:
-        """Largest normalised residual with any weight."""
-        ...
-
-
-@dataclass(frozen=True)
-class StepLimits:
-    """Bounds of a small step of a parameter: a share of its sigma, or a value in rad or m if that is larger."""
-
-    sigmas: float
-    rad: float
-    m: float
-
-
 CONVERGED = StepLimits(1e-3, 1e-10, 1e-9)  # after such a step no further step is necessary
-SETTLED = StepLimits(0.05, 1e-6, 1e-5)  # after such a step another reading would hardly change the weights
-LEAST_PASSES = 3  # readings of the points: for the drift, for outliers beside it, for their scale and the white noise
 CLOSING_STEPS = 8  # largest number of steps after the last reading, with its weights: known parameters join in then
 
 
@@ -81,7 +44,8 @@ class MountAdjustment:
     points of an interval (empty without a solution; the laser's factor, if it is well known, is already in the INS's
     white noise of the solution); ping: noise that the soundings of a ping share, as the sums have it (None without a
     sonar or a solution); drift_figures: the figures of the drift, which the solution has; equations: normal equations
-    of all parameters, also of the fixed ones; last: the values of the final solution.
+    of all parameters, also of the fixed ones; last: the values of the final solution; rival: another minimum of the sum
+    of squares, if there is one.
     """
 
     state: State
@@ -96,6 +60,7 @@ class MountAdjustment:
     converged: bool
     iterations: int
     last: Iterate
+    rival: Rival | None
 
     @property
     def values(self) -> CurrentValues:
@@ -130,12 +95,6 @@ class MountAdjustment:
         return Scatter(self.equations.squares - within[0], self.redundancy - within[1])
 
 
-def estimated_columns(state: State, additional: Sequence[str] = (), mount: bool = True) -> list[int]:
-    """Return the numbers of the parameters to estimate: mount, surfaces, and the ones named in ``additional``."""
-    surfaces = range(state.surface_slice.start, state.surface_slice.stop)
-    return sorted({*range(N_MOUNT if mount else 0), *surfaces, *(state.names.index(name) for name in additional)})
-
-
 def adjust_mount(
     problem: CalibrationProblem, streams: Mapping[str, Stream], settings: IterationSettings, gap_s: float
 ) -> MountAdjustment:
@@ -152,9 +111,10 @@ def adjust_mount(
     gap_s : float
         A longer time (s) without observations interrupts the knots of the drift.
     """
-    prior = problem.prior
-    figures, ping = DriftFigures.of_session(prior.noise), None
-    weighted = weighted_iteration(problem, streams, settings, gap_s)
+    prior, ping = problem.prior, None
+    figures = DriftFigures.of_session(prior.noise)
+    chosen = chosen_iteration(problem, streams, settings, gap_s)
+    weighted = chosen.weighted
     # parameters that the points tell of, and that are known beforehand, are estimated with the last weights
     last, estimated = weighted.last, np.union1d(weighted.estimated, prior.known_parameters)
     factors: dict[str, EpochVarianceFactor] = {}
@@ -165,9 +125,8 @@ def adjust_mount(
         if "mbes" in streams:  # a part of the sonar's noise is common to a ping
             soundings, surfaces = last.linearisation.sums["mbes"], last.linearisation.state.surfaces
             ping = ping_noise(soundings, surfaces, prior.noise.white, factors["laser"])
-            with_pings = soundings.stored(
-                partial(with_ping_noise, noise=ping, surfaces=surfaces, white=prior.noise.white)
-            )
+            with_noise = partial(with_ping_noise, noise=ping, surfaces=surfaces, white=prior.noise.white)
+            with_pings = soundings.stored(with_noise)
             last = replace(last, linearisation=last.linearisation.with_sums("mbes", with_pings))
             factors["mbes"] = ping.epoch
         noise = noise_seen_by_laser(prior.noise, factors["laser"])
@@ -175,7 +134,7 @@ def adjust_mount(
         figures = last.drift_figures(noise, prior.drift, estimated, reduced)
         for closing in range(CLOSING_STEPS):
             last, solution = last.stepped(figures.noise, estimated, None if closing else reduced)
-            converged = weighted.settled and _is_small(solution, CONVERGED)
+            converged = weighted.settled and is_small(solution, CONVERGED)
             if converged:
                 break
     # solve with the equations of all parameters: total covariance and tests need the fixed parameters
@@ -194,73 +153,5 @@ def adjust_mount(
         converged=converged and not solution.deficiency,
         iterations=weighted.iterations,
         last=last,
+        rival=chosen.rival,
     )
-
-
-@dataclass(frozen=True)
-class WeightedIteration:
-    """The iteration after its last reading of the points; ``deficient``: the data leave directions open."""
-
-    last: Iterate
-    estimated: Integers
-    weighting: Weighting
-    accumulation: Accumulation
-    settled: bool
-    deficient: bool
-    iterations: int
-
-
-def weighted_iteration(
-    problem: CalibrationProblem, streams: Mapping[str, Stream], settings: IterationSettings, gap_s: float
-) -> WeightedIteration:
-    """Read all points, solve and step, until the weights do not change, or a direction is open.
-
-    Without points of the calibrated sensor, surfaces and drift alone are estimated. Parameters: as for
-    :func:`adjust_mount`.
-    """
-    model, prior = problem.model, problem.prior
-    state = initial_mount(streams["mbes"], model) if "mbes" in streams else model.coarse
-    values = CurrentValues(state, weighting=Weighting(white=prior.noise.white))
-    estimated = np.array(estimated_columns(state, settings.free, mount=state.calibrated in streams))
-    estimated = np.union1d(estimated, prior.known_parameters) if prior.from_start else estimated
-    iteration = 0
-    while True:
-        iteration += 1
-        # read all points, and take the variance factors of sensors and surfaces from their scatter
-        accumulation, weighting = reweighted(accumulate(streams, model, values), values.state, values.weighting)
-        drift = values.drift or model.body.zero_drift(accumulation.records, prior.noise, gap_s)
-        linearisation = Linearisation(accumulation.sums, values.state, model.body, drift, problem.mapper)
-        start = Iterate(linearisation, drift, prior.priors)
-        # solve and step
-        stepped, solution = start.stepped(replace(prior.noise, white=weighting.white), estimated)
-        deficient = solution.deficiency > 0
-        settled = weighting.robust is not None and _is_small(solution, SETTLED)
-        if deficient or (settled and iteration >= LEAST_PASSES) or iteration >= settings.max_iterations:
-            return WeightedIteration(
-                last=start if deficient else stepped,
-                estimated=estimated,
-                weighting=weighting,
-                accumulation=accumulation,
-                settled=settled,
-                deficient=deficient,
-                iterations=iteration,
-            )
-        # from the next reading on reduce the weights of outliers
-        weighting = replace(weighting, robust=(settings.robust_k0, settings.robust_k1))
-        if iteration > 1:  # scales and the INS's white noise come from residuals without the drift and outliers
-            white = noise_seen_by_laser(prior.noise, stepped.record_noise(prior.noise)).white
-            weighting = replace(weighting, scales=accumulation.robust_scales(len(state.surfaces)), white=white)
-        values = CurrentValues(stepped.linearisation.state, stepped.drift, weighting)
-        del accumulation, linearisation, start, stepped  # the next reading needs their memory
-
-
-def _is_small(solution: Solution, limits: StepLimits) -> bool:
-    """Return whether the step of each estimated mount parameter is within the limits; without these, of each surface's.
-
-    The turns and shifts of surfaces, rad and m, have the limit of rotations.
-    """
-    estimated = solution.estimated
-    judged = estimated < N_MOUNT if np.any(estimated < N_MOUNT) else np.ones(len(estimated), dtype=bool)
-    sigma = np.sqrt(np.diag(solution.covariance))[judged]
-    absolute = np.where((estimated >= 3) & (estimated < N_MOUNT), limits.m, limits.rad)[judged]
-    return bool(np.all(np.abs(solution.step[estimated][judged]) <= np.maximum(limits.sigmas * sigma, absolute)))

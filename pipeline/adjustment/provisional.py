@@ -14,8 +14,9 @@ import numpy as np
 import pandas as pd
 
 from pipeline.adjustment.consider import BUILT_DEG, BUILT_M, known_parameters, wet_faces_uncertain, wet_sigmas
-from pipeline.adjustment.iteration import IterationSettings, WeightedIteration, weighted_iteration
 from pipeline.adjustment.problem import CalibrationProblem, designed_planes
+from pipeline.adjustment.two_starts import chosen_iteration
+from pipeline.adjustment.weighted_iteration import IterationSettings, WeightedIteration
 from pipeline.artefacts.sampling import sample_rows
 from pipeline.artefacts.streams import Batch, MemoryPart, Stream, point_array
 from pipeline.config.stage_settings import FacesAsBuilt
@@ -128,7 +129,7 @@ def with_adjusted_sample(
         if number < ROUNDS:  # enough to label by: white noise of single records takes half the time
             noise = replace(problem.prior.noise, white=np.zeros(N_POSE))
             problem = replace(problem, prior=replace(problem.prior, noise=noise))
-        adjustment = weighted_iteration(problem, labelled, settings, gap_s)
+        adjustment = chosen_iteration(problem, labelled, settings, gap_s).weighted
         if adjustment.deficient or not adjustment.settled:
             continue
         corrected = corrected_context(context, adjustment)

@@ -104,10 +104,22 @@ def _summary_table(adjustment: MountAdjustment, test: Mapping[str, Any]) -> pd.D
         "condition": solution.condition,
         "rank_deficiency": solution.deficiency,
         "weakest": "" if solution.deficiency else weakest_direction(solution.covariance[:N_MOUNT, :N_MOUNT]),
+        **_rival(adjustment),
         **{f"test_{name}": test[name] for name in ("statistic", "dof", "limit", "passed")},
         "reason": _no_result(solution.deficiency) if solution.deficiency else "",
     }
     return pd.DataFrame([summary])
+
+
+def _rival(adjustment: MountAdjustment) -> dict[str, float]:
+    """Return the columns of another minimum, NaN if there is none."""
+    rival = adjustment.rival
+    strength, apart = (np.nan, np.full(N_MOUNT, np.nan)) if rival is None else (rival.strength, rival.apart)
+    return {
+        "rival_strength": strength,
+        "rival_yaw_deg": float(np.degrees(apart[2])),
+        "rival_lever_arm_y_m": float(apart[4]),
+    }
 
 
 def _no_result(deficiency: int) -> str:

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.adjustment.iteration import weighted_iteration
 from pipeline.adjustment.observation_model import ObservationModel
 from pipeline.adjustment.problem import CalibrationProblem, PointNoise, PriorInformation, sensor_sigmas
+from pipeline.adjustment.weighted_iteration import weighted_iteration
 from pipeline.artefacts.streams import Batch, MemoryPart, Stream
 from pipeline.config.pool import Adjust, Ingest
 from pipeline.finding.dry_planes import DryPlane

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.adjustment.consider import known_parameters, sonar_errors
-from pipeline.adjustment.iteration import estimated_columns
 from pipeline.adjustment.problem import faces_on_surfaces
+from pipeline.adjustment.weighted_iteration import estimated_columns
 from pipeline.config.instruments import deep_merge
 from pipeline.config.plan import Budget, Pass, Plan
 from pipeline.config.pool import PoolConfig

@@ -10,6 +10,8 @@ from pipeline.maths.mount_parameters import MOUNT_WORDS
 from pipeline.report.reason_codes import ReasonCode, Statement
 from pipeline.target.laser_search import LARGEST_TURN
 
+LEAST_STRENGTH = 5.0  # of another minimum of the adjustment: at 5 it is exp(25 / 2) times less likely
+
 
 @dataclass(frozen=True, kw_only=True)
 class MountSearch:
@@ -61,6 +63,24 @@ def ambiguities(pose: pd.Series, mount: pd.Series, search: MountSearch, shape: s
         )
         statements.append(Statement(ReasonCode.AMBIGUOUS_MOUNT, words))
     return statements
+
+
+def ambiguous_minimum(summary: pd.Series) -> list[Statement]:
+    """Return the reason that the adjustment has two minima, and hardly tells them apart; empty if it does.
+
+    Parameters
+    ----------
+    summary : row of the table ``summary`` of the adjustment
+    """
+    if not summary["rival_strength"] < LEAST_STRENGTH:  # NaN without another minimum
+        return []
+    words = (
+        f"two mounts fit the soundings nearly as well: the other's yaw differs by {summary['rival_yaw_deg']:+.2f}°, "
+        f"its lever arm y by {1000 * summary['rival_lever_arm_y_m']:+.0f} mm (strength "
+        f"{summary['rival_strength']:.1f}; {LEAST_STRENGTH:g} tells them apart). All walls look one way, and a sonar "
+        "turned to either side of that way sees nearly the same: pass a wall that looks another way, too"
+    )
+    return [Statement(ReasonCode.AMBIGUOUS_MOUNT, words)]
 
 
 def _ambiguous_pose(pose: pd.Series, shape: str, sides: str) -> Statement:

@@ -36,8 +36,10 @@ REMEDIES: dict[Code, Remedy] = {
         "Run poolcal check. Correct the sign or value that the reason names, and run again.",
     ),
     Code.AMBIGUOUS_MOUNT: Remedy(
-        "A second mount fits the soundings nearly as well: mostly the coarse lever arm is a block (2 e) off.",
-        "Measure the coarse lever arm again, above all z.",
+        "A second mount fits the soundings nearly as well: mostly the coarse lever arm is a block (2 e) off. Where all "
+        "walls look one way, it is the sonar turned to the other side of that way.",
+        "Measure the coarse lever arm again, above all z. Where the reason says that all walls look one way, pass a "
+        "wall that looks another way, too.",
     ),
     Code.NO_RESULT: Remedy(
         "The data leave some direction of the six values open.",

@@ -6,8 +6,9 @@ The limits are defined at these places (paths from ``pipeline/``):
   (``search_...``, ``farthest_mount``, ``ambiguity_share``, ``ambiguity_margin``), ``_best_start`` of
   target/pose_search.py (largest distance of a pose), ``LARGEST_TURN`` of target/laser_search.py;
 * no result: ``RANK_TOLERANCE`` of maths/adjustment/solution.py;
-* convergence: ``max_iterations`` of class ``Adjust`` of config/pool.py, ``SETTLED``, ``CONVERGED`` and
-  ``CLOSING_STEPS`` of adjustment/iteration.py;
+* convergence: ``max_iterations`` of class ``Adjust`` of config/pool.py, ``SETTLED`` of
+  adjustment/weighted_iteration.py, ``CONVERGED`` and ``CLOSING_STEPS`` of adjustment/iteration.py;
+* another minimum of the adjustment: ``SAME`` of adjustment/two_starts.py, ``LEAST_STRENGTH`` of ambiguities.py;
 * number of soundings on a family, and its noise against the gate: ``MIN_SOUNDINGS`` and ``MAX_SHARE_OF_GATE`` of
   label_checks.py;
 * mean residuals: ``test_level`` and ``test_tolerance_m`` of class ``Adjust`` of config/pool.py; ``FEWEST``,
@@ -39,7 +40,7 @@ import pandas as pd
 from pipeline.config.pool import Method
 from pipeline.config.verdict import VerdictLimits
 from pipeline.maths.mount_parameters import PARAMETERS
-from pipeline.report.ambiguities import MountSearch, ambiguities
+from pipeline.report.ambiguities import MountSearch, ambiguities, ambiguous_minimum
 from pipeline.report.coarse_mount import contradicted_coarse_mount
 from pipeline.report.evidence import Evidence
 from pipeline.report.hypotheses import Hypothesis, hypotheses
@@ -116,6 +117,7 @@ def rejections(
     if not summary["converged"]:
         words = f"the adjustment did not converge in {summary['iterations']} steps"
         reasons.append(Statement(ReasonCode.NOT_CONVERGED, words))
+    reasons += ambiguous_minimum(summary)
     gates_m = {"laser": evidence.target_pose["gate_m"].iloc[0], "mbes": evidence.provisional_mount["gate_m"].iloc[0]}
     reasons += too_few_soundings(evidence.cells)
     reasons += _residual_reasons(evidence, criteria, drift_check)

@@ -5,7 +5,8 @@ import pytest
 from scipy.stats import chi2
 
 from pipeline.adjustment.consider import sonar_errors
-from pipeline.adjustment.iteration import adjust_mount, estimated_columns
+from pipeline.adjustment.iteration import adjust_mount
+from pipeline.adjustment.weighted_iteration import estimated_columns
 from pipeline.artefacts.streams import MemoryPart, Stream
 from pipeline.config.mount import MountSigma
 from pipeline.config.pool import Adjust, AsBuilt

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.adjustment.iteration import WeightedIteration
 from pipeline.adjustment.problem import designed_planes
 from pipeline.adjustment.provisional import corrected_context
+from pipeline.adjustment.weighted_iteration import WeightedIteration
 from pipeline.maths.adjustment.pseudo_observations import displacement
 from pipeline.target.labelled_points import LabellingContext
 from tests.support.docks import DOCK

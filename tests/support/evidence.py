@@ -57,7 +57,7 @@ def evidence(
     }
     mount_row = {"ambiguous": False, "rival_score": 0.1, "score": 0.4, "within": True, "gate_m": 0.08}
     mount_row |= {f"rotation_{axis}_deg": 4.4 for axis in "xyz"} | {f"lever_arm_{axis}_m": 0.44 for axis in "xyz"}
-    summary_row = {"reason": "", "converged": True, "iterations": 6}
+    summary_row = {"reason": "", "converged": True, "iterations": 6, "rival_strength": np.nan}
     row = {"method": "patent_alternating", "reason": "", "converged": True, "iterations": 9}
     cells = pd.DataFrame(
         {

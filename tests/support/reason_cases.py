@@ -44,6 +44,12 @@ REASONS: list[tuple[dict[str, Any], ReasonCode, str]] = [  # evidence, code, wor
     ),
     ({"mount": {"ambiguous": True}}, ReasonCode.AMBIGUOUS_MOUNT, "the soundings fit two ways (score 0.100 against 0."),
     (
+        {"summary": {"rival_strength": 4.9, "rival_yaw_deg": 3.4, "rival_lever_arm_y_m": -0.315}},
+        ReasonCode.AMBIGUOUS_MOUNT,
+        "two mounts fit the soundings nearly as well: the other's yaw differs by +3.40°, its lever arm y by -315 mm "
+        "(strength 4.9; 5 tells them apart)",
+    ),
+    (
         {"summary": {"reason": "the data leave 2 directions open"}},
         ReasonCode.NO_RESULT,
         "the adjustment has no result: the data leave 2 directions open; two more passes at 3 m would do",
