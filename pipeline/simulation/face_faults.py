@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from pipeline.config.target import Letters, Target
 from pipeline.errors import ConfigError
-from pipeline.simulation.mesh import POOL_NAMES, Mesh
+from pipeline.simulation.mesh import BOX, POOL_NAMES, Mesh
 from pipeline.simulation.scenario_surroundings import FaceFault
 from pipeline.simulation.site import Floats
 
@@ -22,7 +22,7 @@ def face_of_polygon(target: Target, polygon: str) -> str:
     ['P2', 'P1-2', 'P3-0-top', '', '']
     """
     if not isinstance(target, Letters):
-        return "" if polygon in POOL_NAMES else polygon
+        return "" if polygon in POOL_NAMES or polygon.startswith(BOX) else polygon
     if polygon == "wall_3":
         return "P2"
     side, *rest = polygon.split("_")

@@ -17,6 +17,7 @@ from pipeline.simulation.site import Floats
 _SIDES = {"south": -1.0, "north": 1.0}
 _BEHIND_M = 30.0  # the floor reaches this far toward the vessel
 POOL_NAMES = ("back_wall", "floor")  # polygons that are not the target's
+BOX = "/"  # first letter of the names of boxes' polygons, which no face's name has
 
 
 @dataclass(frozen=True)
@@ -93,6 +94,17 @@ def pool_polygons(target: Target, surroundings: Surroundings) -> list[FacePolygo
     return [FacePolygon(back_wall, wall)] * surroundings.back_wall + [FacePolygon(the_floor, ground)]
 
 
+def box_polygons(surroundings: Surroundings) -> list[FacePolygon]:
+    """Return the faces of the boxes before the target."""
+    polygons = []
+    for box in surroundings.boxes:
+        (x0, y0, low), (x1, y1, high) = box.low_m, box.high_m
+        corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
+        middle, turn = corners.mean(axis=0), Rotation.from_euler("Z", box.turn_deg, degrees=True).as_matrix()[:2, :2]
+        polygons += prism(f"{BOX}{box.name}", (corners - middle) @ turn.T + middle, low, high)
+    return polygons
+
+
 def corner_lines(target: Target) -> Floats:
     """Return the vertical inner corners at the back wall, (n, 4): x, y, lowest z, highest z; none without letters.
 
@@ -138,10 +150,10 @@ class Mesh:
 
 
 def build_mesh(target: Target, surroundings: Surroundings) -> Mesh:
-    """Return the triangles of target and pool, without the water."""
+    """Return the triangles of target, pool and boxes, without the water."""
     tilt = Rotation.from_euler("XY", surroundings.tilt_deg, degrees=True)
     polygons = [FacePolygon(p.name, tilt.apply(p.vertices_m)) for p in target_polygons(target)]
-    polygons += pool_polygons(target, surroundings)
+    polygons += pool_polygons(target, surroundings) + box_polygons(surroundings)
     triangles: list[tuple[int, int, int]] = []
     planes: list[Floats] = []
     names: list[str] = []

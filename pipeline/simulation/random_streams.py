@@ -8,7 +8,7 @@ PURPOSES = (
     "coarse", "motion", "ins_white", "ins_drift", "laser_range", "laser_angle", "laser_outlier", "laser_water",
     "mbes_clock", "mbes_range", "mbes_angle", "mbes_outlier", "mbes_surface", "mbes_corner", "mbes_drop",
     "coarse_laser", "unevenness", "ins_second_drift", "ins_gnss", "laser_splash", "mbes_side_lobe", "mbes_image",
-    "mbes_ping", "mbes_steering", "mbes_pps",
+    "mbes_ping", "mbes_steering", "mbes_pps", "fouling",
 )  # append only: the place in this list is part of the seed
 
 

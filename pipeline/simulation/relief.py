@@ -1,4 +1,4 @@
-"""How the target's faces as built stand off their planes: shifted, turned, bowed, uneven.
+"""How the target's faces as built stand off their planes: shifted, turned, bowed, uneven, and fouled below the water.
 
 The mesh stays as designed. A ray that meets a face's plane is made longer or shorter until it meets the face as built.
 Thus no cracks open between faces, and both sensors see the same faces.
@@ -15,7 +15,24 @@ from pipeline.simulation.scenario_surroundings import Surroundings
 from pipeline.simulation.site import Floats
 
 _STEPS = 3  # each leaves of the error the slope of the relief times the tangent of the incidence, some hundredths
-_WAVES = 32  # that make up the unevenness
+_WAVES = 32  # that make up a field
+
+
+class _Waves:
+    """A random field of sigma 1, a sum of waves, alike over a length."""
+
+    def __init__(self, seed: int, name: str, length_m: float) -> None:
+        random = generator(seed, name)
+        waves = random.standard_normal((_WAVES, 3)) / length_m
+        self._waves_1_m = waves.astype(np.float32)  # four times as fast; wrong by some 1e-5 of the field
+        self._phases = random.uniform(0, 2 * np.pi, _WAVES).astype(np.float32)
+
+    def at(self, points_m: Floats) -> Floats:
+        """Return the field (n,) at points (n, 3)."""
+        points, total = points_m.astype(np.float32), np.zeros(len(points_m), dtype=np.float32)
+        for wave, phase in zip(self._waves_1_m, self._phases, strict=True):
+            total += np.cos(points @ wave + phase)
+        return np.asarray(np.sqrt(2 / _WAVES) * total)
 
 
 class Relief:
@@ -26,15 +43,15 @@ class Relief:
         self.faces = np.array([face_of_polygon(target, polygon) for polygon in mesh.names])
         faults = enumerate(surroundings.face_faults)
         self._faults = [PlacedFault(fault, k, self.faces, mesh, target.water_level_m) for k, fault in faults]
-        self._sigma_m = surroundings.unevenness_m
-        random = generator(seed, "unevenness")
-        waves = random.standard_normal((_WAVES, 3)) / surroundings.unevenness_length_m
-        self._waves_1_m = waves.astype(np.float32)  # four times as fast; wrong by some 1e-5 of the unevenness
-        self._phases = random.uniform(0, 2 * np.pi, _WAVES).astype(np.float32)
+        self._surroundings, self._water_level_m = surroundings, target.water_level_m
+        self._uneven, self._fouling = (
+            _Waves(seed, name, surroundings.unevenness_length_m) for name in ("unevenness", "fouling")
+        )
 
     def __bool__(self) -> bool:
         """Return whether any face stands off its plane."""
-        return bool(self._faults) or self._sigma_m > 0
+        settings = self._surroundings
+        return bool(self._faults) or max(settings.unevenness_m, settings.fouling_m, settings.fouling_sigma_m) > 0
 
     def ranges(self, ranges_m: Floats, triangles: NDArray[np.int64], origins_m: Floats, directions: Floats) -> Floats:
         """Return the ranges (n,) to the faces as built, from those to the planes of the triangles that the rays meet.
@@ -53,10 +70,12 @@ class Relief:
         for fault in self._faults:
             rows = np.flatnonzero(fault.triangles[triangles] & fault.concerns(points_m[:, 2]))
             heights[rows] += fault.heights_m(triangles[rows], points_m[rows])
-        if self._sigma_m:
-            rows = np.flatnonzero(self.faces[triangles] != "")
-            points, total = points_m[rows].astype(np.float32), np.zeros(len(rows), dtype=np.float32)
-            for wave, phase in zip(self._waves_1_m, self._phases, strict=True):
-                total += np.cos(points @ wave + phase)
-            heights[rows] += self._sigma_m * np.sqrt(2 / _WAVES) * total
+        settings, on_target = self._surroundings, self.faces[triangles] != ""
+        if settings.unevenness_m:
+            rows = np.flatnonzero(on_target)
+            heights[rows] += settings.unevenness_m * self._uneven.at(points_m[rows])
+        if settings.fouling_m or settings.fouling_sigma_m:
+            rows = np.flatnonzero(on_target & (points_m[:, 2] < self._water_level_m))
+            grown_m = settings.fouling_m + settings.fouling_sigma_m * self._fouling.at(points_m[rows])
+            heights[rows] += np.maximum(grown_m, 0.0)
         return heights

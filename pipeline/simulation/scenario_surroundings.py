@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from pipeline.config.quantities import Angle, Lever, Model, NotNegative, Positive
 from pipeline.config.target import FaceName
@@ -26,6 +26,25 @@ class FaceFault(Model):
     bow_m: Metres = 0.0
 
 
+class Box(Model):
+    """A box that stands before the target or on its foot: a fender, a ladder's rung, a footing, a moored boat's hull.
+
+    It is given by its lowest and its highest corner in the target frame, and then turned about the vertical through its
+    middle, counter-clockwise from above. Both sensors see it; pool.yaml does not know it.
+    """
+
+    name: FaceName
+    low_m: tuple[Lever, Lever, Lever]
+    high_m: tuple[Lever, Lever, Lever]
+    turn_deg: Angle = 0.0
+
+    @model_validator(mode="after")
+    def _is_a_box(self) -> "Box":
+        if not all(low < high for low, high in zip(self.low_m, self.high_m, strict=True)):
+            raise ValueError(f"high_m = {list(self.high_m)} must lie above low_m = {list(self.low_m)} on all axes")
+        return self
+
+
 class Surroundings(Model):
     """The pool round the target, and errors of the target's build and of its position in pool.yaml."""
 
@@ -35,8 +54,11 @@ class Surroundings(Model):
     wall_above_m: NotNegative = 0.5  # the back wall ends this much above the target's top
     tilt_deg: tuple[Angle, Angle] = (0.0, 0.0)  # the target as built, turned about its x and y axes
     face_faults: Annotated[tuple[FaceFault, ...], Field(max_length=100)] = ()  # pool.yaml does not know them
+    boxes: Annotated[tuple[Box, ...], Field(max_length=500)] = ()  # before the target; pool.yaml does not know them
+    fouling_m: NotNegative = 0.0  # thickness of what grows on the wet faces, in the mean
+    fouling_sigma_m: NotNegative = 0.0  # by which it varies; it is never below zero
     unevenness_m: NotNegative = 0.0  # sigma of the target's faces about their planes
-    unevenness_length_m: Positive = 0.5  # over which it is alike: correlation exp(-d² / 2 length²)
+    unevenness_length_m: Positive = 0.5  # over which it, and the fouling, is alike: correlation exp(-d² / 2 length²)
     origin_error_m: tuple[Lever, Lever, Lever] = (0.0, 0.0, 0.0)  # configured minus true, target axes
     azimuth_error_deg: Angle = 0.0  # configured minus true
     give_azimuth: bool = True  # false: pool.yaml leaves azimuth_deg open
