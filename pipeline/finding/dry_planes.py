@@ -17,6 +17,7 @@ VOXEL_M, CELL_M = 0.3, 0.25
 FEWEST, FEWEST_CELLS, REFITS = 4, 8, 5  # points of a cell, cells of a plane, fits of a plane to its cells
 GROWTH = GrowthLimits(thickness_m=0.03, distance_m=0.06, least_voxels=12)
 OFF_M = 0.15  # points of a plane's voxels farther off belong to something in front of it
+SAMPLE = 4000  # points of a plane that are kept for pictures, up to twice as many
 MARGIN_M, CORNERS = 0.1, 8  # of the outline: inside the outermost points; most corners
 LEAST_M, UNEVEN_M, BOW_M, COVERED = 1.0, 0.03, 0.03, 0.6  # extent; RMS; height of a bow; share of the cells seen
 LEVEL_DEG = 10.0  # a plane that is less inclined is a deck, a quay's top or the water
@@ -29,7 +30,8 @@ class DryPlane:
     """A plane of the cloud, frame of the points: ``normal · x = distance_m``, the normal toward the boat.
 
     outline_m (k, 2): its dry part along ``plane_axes(normal)``; lowest_m: z of its lower end; column_ends_m: z at which
-    columns of its points end; refused: why it cannot serve, "" if it can.
+    columns of its points end; sample_m (k, 3): of some of its points the place along the first axis, the height z, and
+    the distance from the plane; refused: why it cannot serve, "" if it can.
     """
 
     normal: Array
@@ -40,12 +42,18 @@ class DryPlane:
     outline_m: Array
     lowest_m: float
     column_ends_m: Array
+    sample_m: Array
     refused: str = ""
 
     @property
     def tilt_deg(self) -> float:
         """Return the inclination from level, 90: upright; above 90: it overhangs."""
         return float(np.degrees(np.arccos(np.clip(self.normal[2], -1.0, 1.0))))
+
+    @property
+    def level(self) -> bool:
+        """Return whether the plane is a deck, a quay's top or the water."""
+        return min(self.tilt_deg, 180 - self.tilt_deg) < LEVEL_DEG
 
     def corners_m(self, outline_m: Array) -> Array:
         """Return the corners (k, 3) of an outline (k, 2) in the plane."""
@@ -105,6 +113,7 @@ def _plane(points_m: Array, grown: Plane, boat_m: Array) -> DryPlane:
         outline_m=outline,
         lowest_m=float(np.quantile(heights, 0.01)) if len(heights) else np.inf,
         column_ends_m=_column_ends(in_plane[:, 0], heights),
+        sample_m=np.column_stack([in_plane[:, 0], heights, away])[:: max(1, len(heights) // SAMPLE)],
     )
     return replace(made, refused=_refusal(made))
 
@@ -135,8 +144,8 @@ def _column_ends(along_m: Array, heights_m: Array) -> Array:
 
 def _refusal(plane: DryPlane) -> str:
     """Return why a plane cannot serve, without regard to the water; "" if it can."""
-    flat, tilt = plane.flat, plane.tilt_deg
-    if min(tilt, 180 - tilt) < LEVEL_DEG:
+    flat = plane.flat
+    if plane.level:
         return "level"
     if min(flat.width_m, flat.height_m) < LEAST_M or len(plane.outline_m) < 3:
         return f"smaller than {LEAST_M:g} m"

@@ -19,6 +19,7 @@ from pipeline.mount import mount_of
 from pipeline.readers.file_summaries import thin_sigmas
 from pipeline.readers.track_tables import trajectory_table
 
+TRACK = 2000  # places of the boat that are kept for pictures
 PROVISIONAL = 250_000  # points of the planes that the drift is taken from
 
 
@@ -45,7 +46,9 @@ def find_place(ins: Stream, laser: Stream, session: SessionConfig, depth_m: floa
     planes = dry_planes(points.along(trajectory, mount).level_m, boat_m)
     level_m = water_level_m(planes)
     place = found_place(reaching_water(planes, level_m), level_m, context.frame, depth_m)
-    return replace(place, read=points.read, used=len(points), boat_m=(float(boat_m[0]), float(boat_m[1])))
+    track = trajectory.positions_m[:: max(1, len(trajectory.positions_m) // TRACK), :2]
+    boat = float(boat_m[0]), float(boat_m[1])
+    return replace(place, read=points.read, used=len(points), boat_m=boat, track_m=track)
 
 
 def _read(ins: Stream) -> tuple[pd.DataFrame, list[Batch]]:

@@ -10,9 +10,7 @@ from pipeline.text_table import text_table
 
 def table_text(place: FoundPlace) -> str:
     """Return the planes that were found, those that serve first, and the place, for the screen."""
-    names = {id(face.plane): face.name for face in place.faces}
-    order = sorted(place.planes, key=lambda plane: (id(plane) not in names, names.get(id(plane), "")))
-    rows = [_row(names.get(id(plane), ""), plane, place.boat_m) for plane in order]
+    rows = table_rows(place)
     head = ["face", "lies to °", "away m", "width m", "height m", "looks to °", "lean °", "uneven mm", "points", ""]
     serve = f"{plural(len(place.faces), 'face')} of {plural(len(place.planes), 'plane')} can serve"
     return "\n".join(
@@ -26,6 +24,18 @@ def table_text(place: FoundPlace) -> str:
             f"{place.height_m:.3f}; azimuth {place.azimuth_deg:.3f}°; the water is at {place.water_level_m:.3f} m.",
         ]
     )
+
+
+def serving_first(place: FoundPlace) -> list[DryPlane]:
+    """Return all planes: those of faces in the order of their names, then the others."""
+    names = {id(face.plane): face.name for face in place.faces}
+    return sorted(place.planes, key=lambda plane: (id(plane) not in names, names.get(id(plane), "")))
+
+
+def table_rows(place: FoundPlace) -> list[list[str]]:
+    """Return the rows of the table, a cell for each column; the last says why a plane cannot serve."""
+    names = {id(face.plane): face.name for face in place.faces}
+    return [_row(names.get(id(plane), ""), plane, place.boat_m) for plane in serving_first(place)]
 
 
 def _row(name: str, plane: DryPlane, boat_m: tuple[float, float]) -> list[str]:

@@ -1,7 +1,7 @@
 """The target frame of a found place, and its faces in it, continued below the water."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import radians
 
 import numpy as np
@@ -24,19 +24,23 @@ DIGITS, ANGLE_DIGITS = 3, 9  # decimals of metres, and of latitude and longitude
 
 @dataclass(frozen=True)
 class FoundFace:
-    """A face: its name, and its corners (k, 3), counter-clockwise as the boat sees them, target frame."""
+    """A face: its name, and its corners (k, 3), counter-clockwise as the boat sees them, target frame.
+
+    continued_m (k, 2): the same along the axes of its plane.
+    """
 
     name: str
     corners_m: Array
     plane: DryPlane
+    continued_m: Array
 
 
 @dataclass(frozen=True)
 class FoundPlace:
     """A target: origin and azimuth, the height of the water in its frame, its faces.
 
-    planes: all that were found; read, used: numbers of laser points; boat_m: the middle of the boat's track, east and
-    north in the planes' frame.
+    planes: all that were found; level_m: height of the water in their frame; read, used: numbers of laser points;
+    boat_m: the middle of the boat's track, east and north in the planes' frame; track_m (k, 2): some of its places.
     """
 
     latitude_deg: float
@@ -46,9 +50,11 @@ class FoundPlace:
     water_level_m: float
     faces: tuple[FoundFace, ...]
     planes: tuple[DryPlane, ...]
+    level_m: float
     read: int = 0
     used: int = 0
     boat_m: tuple[float, float] = (0.0, 0.0)
+    track_m: Array = field(default_factory=lambda: np.empty((0, 2)))
 
 
 def found_place(planes: Sequence[DryPlane], level_m: float, frame: PoolFrame, depth_m: float) -> FoundPlace:
@@ -90,12 +96,12 @@ def found_place(planes: Sequence[DryPlane], level_m: float, frame: PoolFrame, de
     judged, faces = [], []
     for plane in planes:
         if not plane.refused:
-            outline = plane.corners_m(_continued(plane, level_m, depth_m))
-            corners = target.points_from_ecef(frame.points_to_ecef(outline))
+            continued = _continued(plane, level_m, depth_m)
+            corners = target.points_from_ecef(frame.points_to_ecef(plane.corners_m(continued)))
             if looks_away(corners, plane_of(corners)[0]):
                 plane = replace(plane, refused="looks away from the passes beside the largest wall")
             else:
-                faces.append((plane, np.round(corners, DIGITS)))
+                faces.append((plane, np.round(corners, DIGITS), continued))
         judged.append(plane)
     return FoundPlace(
         latitude_deg=latitude_deg,
@@ -105,6 +111,7 @@ def found_place(planes: Sequence[DryPlane], level_m: float, frame: PoolFrame, de
         water_level_m=round(float(water), DIGITS) + 0.0,  # no -0.0
         faces=_named(faces),
         planes=tuple(judged),
+        level_m=level_m,
     )
 
 
@@ -124,12 +131,12 @@ def _continued(plane: DryPlane, level_m: float, depth_m: float) -> Array:
     return bent(convex_hull(np.concatenate([plane.outline_m, _at_height(plane, level_m - depth_m)])), BEND_M)
 
 
-def _named(faces: Sequence[tuple[DryPlane, Array]]) -> tuple[FoundFace, ...]:
+def _named(faces: Sequence[tuple[DryPlane, Array, Array]]) -> tuple[FoundFace, ...]:
     """Return the faces with names: walls and slopes, numbered along y."""
     counts = {"wall": 0, "slope": 0}
     named = []
-    for plane, corners in sorted(faces, key=lambda face: float(face[1][:, 1].mean())):
+    for plane, corners, continued in sorted(faces, key=lambda face: float(face[1][:, 1].mean())):
         kind = "wall" if abs(plane.tilt_deg - 90) < UPRIGHT_DEG else "slope"
         counts[kind] += 1
-        named.append(FoundFace(f"{kind}-{counts[kind]}", corners, plane))
+        named.append(FoundFace(f"{kind}-{counts[kind]}", corners, plane, continued))
     return tuple(named)

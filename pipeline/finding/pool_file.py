@@ -19,6 +19,7 @@ AS_BUILT = """\
 as_built:                       # of walls below the water that nobody has surveyed: fouled, weathered
   offset_sigma_m: 0.02
   angle_sigma_deg: 0.1
+  bow_sigma_m: 0.005
 """
 
 

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from pipeline.errors import ConfigError
 from stages.cli.application import app
 from stages.cli.arguments import POOL_FILE, AsJson, Jobs, Pool, Session, SessionYaml
 
@@ -42,7 +43,10 @@ def _check(
 def _target(
     session: Session,
     out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="write a pool's config with them")] = None,
-    depth: Annotated[float, typer.Option("--depth", metavar="M", help="depth of the water at the wall")] = 4.0,
+    html: Annotated[Path | None, typer.Option("--html", metavar="FILE", help="a page with pictures of them")] = None,
+    depth: Annotated[
+        float | None, typer.Option("--depth", metavar="M", help="depth of the water at the wall; default: 4")
+    ] = None,
     bottom: Annotated[
         Path | None,
         typer.Option("--bottom", metavar="RUN", help="a run of this session: find flat pieces of the bottom with it"),
@@ -53,10 +57,13 @@ def _target(
     if bottom is not None:
         from stages.commands import target_bottom
 
+        for option, given in (("--depth", depth), ("--html", html)):
+            if given is not None:
+                raise ConfigError(f"{option} {given}: not with --bottom, which takes the run's faces; leave it out")
         return target_bottom.command(session, bottom, out, jobs)
     from stages.commands import target
 
-    return target.command(session, out, depth, jobs)
+    return target.command(session, out, html, depth, jobs)
 
 
 @app.command("plan")

@@ -51,3 +51,14 @@ def test_a_file_of_somebody_elses_is_not_replaced(dock: Path, tmp_path: Path) ->
     one_line(poolcal("target", dock, "--out", file), str(file))
     assert file.read_text(encoding="utf-8") == "target: mine\n"
     one_line(poolcal("target", dock, "--out", tmp_path / "pool.txt"), "ends in .yaml")
+
+
+def test_the_page_replaces_itself_and_nothing_else(dock: Path, tmp_path: Path) -> None:
+    page = tmp_path / "place.html"
+    for _ in range(2):
+        assert poolcal("target", dock, "--html", page).status == 0
+    assert "wall-1" in page.read_text("utf-8")
+    page.write_text("mine", "utf-8")
+    one_line(poolcal("target", dock, "--html", page), str(page))
+    assert page.read_text("utf-8") == "mine"
+    one_line(poolcal("target", dock, "--html", dock / "place.html"), "place.html")

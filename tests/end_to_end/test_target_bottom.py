@@ -99,6 +99,11 @@ def test_what_the_bottom_cannot_be_found_with(
     letters = undisturbed[0]
     told = poolcal("target", letters.parent.parent, "--bottom", letters)
     assert told.status == 2
+    for option, value in (("--depth", "3"), ("--html", str(tmp_path / "page.html"))):
+        told = poolcal("target", session, "--bottom", run, option, value)
+        assert told.status == 2
+        assert f"{option} {value}" in told.err.replace("3.0", "3")
+        assert "not with --bottom" in told.err
     told = poolcal("target", session, "--bottom", tmp_path / "none")
     assert told.status == 2
     assert "there is no such folder; name a run folder" in told.err

@@ -1,5 +1,6 @@
 """A target found in the laser's points of a simulated session, held against the truth of the simulator."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,11 +12,12 @@ from pipeline.config.pool import PoolConfig
 from pipeline.config.session import SessionConfig
 from pipeline.config.yaml_models import parse
 from pipeline.finding.find import find_place
-from pipeline.finding.found_text import table_text
+from pipeline.finding.found_text import table_rows, table_text
 from pipeline.finding.place import FoundPlace
 from pipeline.finding.pool_file import pool_yaml
 from pipeline.maths.geometry.geodesy import PoolFrame
 from pipeline.maths.target.model import TargetModel
+from pipeline.results.pages.place_page import place_page
 from pipeline.simulation.session import SimulatedSession
 from pipeline.target.design import target_of
 from tests.support.docks import DOCK
@@ -114,3 +116,31 @@ def test_the_screen_says_what_serves_and_why_the_rest_does_not() -> None:
     assert [float(word) for word in rows["wall-2"][1:3]] == pytest.approx([110.0, 5.5], abs=2.0)  # +x, right of 20°
     assert float(rows["wall-1"][1]) > 110.0 > float(rows["wall-3"][1])  # wall-1 astern, wall-3 ahead
     assert "wall-2" in said
+
+
+def test_what_stands_before_a_wall_is_kept_where_the_boat_sees_it() -> None:
+    """A board of 5 cm, 0.8 to 1.5 m from the wall's end at y = 3. The boat passes toward +y, the wall to starboard:
+    that end is the left one."""
+    board = {"name": "board", "low_m": [-0.05, 1.5, 0.4], "high_m": [0.0, 2.2, 1.4]}
+    session = made(turned(20.0), {"surroundings": {"back_wall": False, "boxes": [board]}})
+    place = found(session)
+    (wall,) = [face for face in place.faces if face.name == "wall-2"]
+    along, height, off = wall.plane.sample_m.T
+    before = (off > 0.03) & (height - place.level_m > 0.6) & (height - place.level_m < 1.2)
+    assert before.sum() > 10
+    assert np.median(along[before]) - along.min() == pytest.approx(1.15, abs=0.12)
+    np.testing.assert_allclose(np.median(off[before]), 0.05, atol=0.005)
+    assert np.median(np.abs(off[~before])) < 0.008
+
+
+def test_the_page_names_each_face_and_says_why_others_do_not_serve() -> None:
+    place = found(made(turned(20.0)))
+    page = place_page(place, "harbour <wall>")
+    assert page.startswith("<!doctype html>")
+    assert "harbour &lt;wall&gt;: 3 faces of" in page
+    assert page.count("<img") == 2
+    for row in table_rows(place):
+        assert all(f">{cell}</td>" in page for cell in row if cell)
+    assert "strike: [wall-1]" in page
+    nothing = replace(place, faces=())
+    assert place_page(nothing, "harbour").count("<img") == 1
