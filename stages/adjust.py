@@ -11,13 +11,14 @@ import pandas as pd
 
 from pipeline.adjustment.consider import known_parameters, sonar_errors, wet_faces_uncertain
 from pipeline.adjustment.ins_drift import drift_model, drift_prior, pose_noise
-from pipeline.adjustment.iteration import MountAdjustment, adjust_mount
+from pipeline.adjustment.iteration import MountAdjustment
 from pipeline.adjustment.laser_design import laser_consider, laser_problem, surveyed_displacement
 from pipeline.adjustment.parts import parts_table
 from pipeline.adjustment.problem import CalibrationProblem, SessionData, sonar_problem, surfaces_of_laser
 from pipeline.adjustment.residual_statistics import ResidualStatistics, residual_statistics
 from pipeline.adjustment.residual_tables import bins_table, map_table
 from pipeline.adjustment.result_tables import result_tables
+from pipeline.adjustment.wet_planes import adjust_true_faces
 from pipeline.artefacts.catalogue.points import FILES, INS_SIGMAS, PASSES, POSES
 from pipeline.artefacts.catalogue.results import (
     ADJUST_SUMMARY,
@@ -29,6 +30,7 @@ from pipeline.artefacts.catalogue.results import (
     FREED,
     GEOMETRY,
     GROUPS,
+    LEFT_OUT,
     PARTS,
     PATTERNS,
     RESIDUAL_BINS,
@@ -37,7 +39,14 @@ from pipeline.artefacts.catalogue.results import (
     SETS,
     SURFACES,
 )
-from pipeline.artefacts.catalogue.target import FACES, LASER_LABELLED, PLANES, SOUNDINGS_LABELLED, TARGET_POSE
+from pipeline.artefacts.catalogue.target import (
+    FACES,
+    LASER_LABELLED,
+    PLANES,
+    PROVISIONAL_MOUNT,
+    SOUNDINGS_LABELLED,
+    TARGET_POSE,
+)
 from pipeline.artefacts.from_tables import target_frame, trajectory_in_target
 from pipeline.artefacts.streams import Stream
 from pipeline.config.pool import Adjust, AsBuilt, Ingest, Segment
@@ -75,6 +84,7 @@ class Inputs:
     faces: Annotated[pd.DataFrame, FACES]
     poses: Annotated[pd.DataFrame, POSES]
     target_pose: Annotated[pd.DataFrame, TARGET_POSE]
+    provisional_mount: Annotated[pd.DataFrame, PROVISIONAL_MOUNT]
     planes: Annotated[pd.DataFrame, PLANES]
     laser_labelled: Annotated[Stream, LASER_LABELLED]
     soundings_labelled: Annotated[Stream, SOUNDINGS_LABELLED]
@@ -95,6 +105,7 @@ class Outputs:
     groups: Annotated[pd.DataFrame, GROUPS]
     cells: Annotated[pd.DataFrame, CELLS]
     summary: Annotated[pd.DataFrame, ADJUST_SUMMARY]
+    left_out: Annotated[pd.DataFrame, LEFT_OUT]
     parts: Annotated[pd.DataFrame, PARTS]
     patterns: Annotated[pd.DataFrame, PATTERNS]
     residuals: Annotated[pd.DataFrame, RESIDUALS]
@@ -111,13 +122,15 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     # Adjust the mount to all labelled points of the sensors that take part.
     labelled = {"laser": inputs.laser_labelled, "mbes": inputs.soundings_labelled}
     points = {sensor: labelled[sensor] for sensor in problem.model.sigmas}
-    adjustment = adjust_mount(problem, points, config.adjust, config.ingest.max_gap_s)
+    gate_m = float(inputs.provisional_mount["gate_m"].iloc[0])
+    adjustment, points, left_out = adjust_true_faces(problem, points, config.adjust, config.ingest.max_gap_s, gate_m)
 
     # Compute the residuals of all points at the adjusted values, and make the tables.
     statistics = residual_statistics(problem, adjustment, points, inputs.passes, config.adjust)
     return Outputs(
         **result_tables(problem, adjustment, statistics, inputs.passes, config.adjust.test_level),
         geometry=weak_geometry(inputs, config, drift, adjustment, statistics),
+        left_out=left_out,
         parts=parts_table(problem, adjustment, inputs.passes),
         patterns=statistics.patterns,
         residuals=statistics.residuals,

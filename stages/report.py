@@ -42,6 +42,7 @@ from pipeline.report.sonar_report import SonarSettings, sonar_report
 from pipeline.report.suspected_causes import errors_allowed_for
 from pipeline.report.systematic_errors import systematic_block
 from pipeline.report.verdict import Criteria, explanations, rejections
+from pipeline.report.wall_checks import left_out_block, unsurveyed_walls
 from pipeline.report.warnings import geometry_gaps, target_found, target_off_origin, unexpected_noise
 from pipeline.target.design import target_of
 
@@ -112,7 +113,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         *correlated_beams(inputs.groups),
         *sigmas_too_small(inputs.estimate, config.adjust.test_level),
         *errors_allowed_for(inputs.freed, config.adjust.test_level),
-        *target_off_origin(target), *target_found(model),
+        *target_off_origin(target), *target_found(model), *unsurveyed_walls(inputs.left_out, inputs.groups),
         *(check for check in (drift_check, off_figures) if check is not None and check not in (NO_DRIFT, *reasons)),
         *report.pass_warnings,
         *deviations_from_design(shape, design_shape(model), shape_errors(inputs.planes, model)),
@@ -134,7 +135,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         "geometry": geometry_block(inputs, report.advice, config.adjust.test_level),
         "parts": parts_block(inputs.parts, config.adjust.test_level),
         "free": free_block(inputs.freed),
-        "target": target,
+        "target": target, **left_out_block(inputs.left_out),
         "passes": passes,
         **report.data_keys,
         **_systematic(inputs.freed, config),
@@ -178,7 +179,6 @@ def _criteria(config: Config, report: SensorReport) -> Criteria:
     return Criteria(
         limits=config.limits,
         test_level=config.adjust.test_level,
-        tolerance_m=config.adjust.test_tolerance_m,
         method=report.method,
         search=report.search,
         shape=config.target.shape,

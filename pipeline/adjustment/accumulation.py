@@ -140,9 +140,10 @@ def reweighted(accumulation: Accumulation, state: State, weighting: Weighting) -
         factors[sensor] = shrunk_factors(np.maximum(factor * change, LEAST_SCALE**2), dof, level)
         shares[sensor] = edge_shares(intervals, len(surfaces))
         divisors = factors[sensor] * shares[sensor] / (factor * share)
-        sums[sensor] = intervals.changed(partial(_rescaled, divisors=divisors))
+        sums[sensor] = intervals.changed(partial(by_divisors, divisors=divisors))
     return replace(accumulation, sums=sums), replace(weighting, factors=factors, edge_shares=shares)
 
 
-def _rescaled(sums: IntervalSums, _: Integers, divisors: Array) -> IntervalSums:
+def by_divisors(sums: IntervalSums, _: Integers, divisors: Array) -> IntervalSums:
+    """Return the sums with the weights divided by a number for each surface (s,), as a change of intervals."""
     return rescaled(sums, divisors)

@@ -1,6 +1,6 @@
 """The solution with the shifts of single faces: their errors for the total covariance, and a test of each."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -12,7 +12,7 @@ from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.maths.adjustment.eliminate_drift import NormalEquations
 from pipeline.maths.adjustment.face_shifts import equations_with_faces
 from pipeline.maths.adjustment.interval_sums import Intervals, IntervalSums
-from pipeline.maths.adjustment.ping_noise import with_ping_noise
+from pipeline.maths.adjustment.ping_noise import with_design_effects, with_ping_noise
 from pipeline.maths.adjustment.pose_errors import PoseNoise
 from pipeline.maths.adjustment.solution import Solution, solve
 
@@ -38,11 +38,12 @@ class FinalSolution:
 def with_shared_noise(
     problem: CalibrationProblem, adjustment: MountAdjustment, sums_by_face: Mapping[str, Intervals]
 ) -> dict[str, Intervals]:
-    """Return the sums by interval and face with the noise that the soundings of a ping share.
+    """Return the sums by interval and face with the noise that the soundings of a ping share, and with roughness.
 
     Parameters: as for :func:`final_solution`.
     """
-    sums = dict(sums_by_face)
+    sums, of_face = dict(sums_by_face), problem.model.faces.surface
+    changes: list[tuple[str, Callable[[IntervalSums], IntervalSums]]] = []
     if adjustment.ping is not None:
         with_pings = partial(
             with_ping_noise,
@@ -50,13 +51,19 @@ def with_shared_noise(
             surfaces=adjustment.last.linearisation.state.surfaces,
             white=problem.prior.noise.white,
         )
-        of_face = problem.model.faces.surface
-
-        def changed(block: IntervalSums, _: Integers) -> IntervalSums:
-            return replace(with_pings(replace(block, surface=of_face[block.surface])), surface=block.surface)
-
-        sums["mbes"] = sums["mbes"].changed(changed)
+        changes.append(("mbes", with_pings))
+    for sensor, rough in adjustment.rough.items():
+        changes.append((sensor, partial(with_design_effects, effects=rough.effects)))
+    for sensor, change in changes:
+        sums[sensor] = sums[sensor].changed(partial(_by_surface, of_face=of_face, change=change))
     return sums
+
+
+def _by_surface(
+    block: IntervalSums, _: Integers, of_face: Integers, change: Callable[[IntervalSums], IntervalSums]
+) -> IntervalSums:
+    """Return sums by face after a change that needs the numbers of their surfaces."""
+    return replace(change(replace(block, surface=of_face[block.surface])), surface=block.surface)
 
 
 def final_solution(

@@ -12,13 +12,16 @@ from pipeline.adjustment.iterate import Iterate
 from pipeline.adjustment.observation_model import CurrentValues
 from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.adjustment.two_starts import Rival, chosen_iteration
+from pipeline.adjustment.wall_roughness import with_roughness
 from pipeline.adjustment.weighted_iteration import IterationSettings, StepLimits, is_small
 from pipeline.artefacts.streams import Stream
 from pipeline.maths.adjustment.drift_likelihood import DriftFigures
 from pipeline.maths.adjustment.eliminate_drift import NormalEquations
+from pipeline.maths.adjustment.eliminate_white_noise import ReducedIntervals
 from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.ping_noise import PingNoise, ping_noise, with_ping_noise
-from pipeline.maths.adjustment.pose_errors import DriftEstimate
+from pipeline.maths.adjustment.pose_errors import DriftEstimate, PoseNoise
+from pipeline.maths.adjustment.roughness import Roughness
 from pipeline.maths.adjustment.solution import Solution, solve
 from pipeline.maths.adjustment.weighting import (
     EpochVarianceFactor,
@@ -33,6 +36,7 @@ Integers = NDArray[np.int64]
 
 
 CONVERGED = StepLimits(1e-3, 1e-10, 1e-9)  # after such a step no further step is necessary
+ROUGH_ROUNDS = 2  # of roughness and drift: what the drift has taken for its own at first shows in the second
 CLOSING_STEPS = 8  # largest number of steps after the last reading, with its weights: known parameters join in then
 
 
@@ -43,9 +47,10 @@ class MountAdjustment:
     accumulation: sums at the final values; epoch_factors: by sensor, the variance factor of the error common to all
     points of an interval (empty without a solution; the laser's factor, if it is well known, is already in the INS's
     white noise of the solution); ping: noise that the soundings of a ping share, as the sums have it (None without a
-    sonar or a solution); drift_figures: the figures of the drift, which the solution has; equations: normal equations
-    of all parameters, also of the fixed ones; last: the values of the final solution; rival: another minimum of the sum
-    of squares, if there is one.
+    sonar or a solution); rough: by sensor, the roughness of walls that nobody has surveyed, as the sums have it;
+    drift_figures: the figures of the drift, which the solution has; equations: normal equations of all parameters, also
+    of the fixed ones; last: the values of the final solution; rival: another minimum of the sum of squares, if there is
+    one.
     """
 
     state: State
@@ -54,6 +59,7 @@ class MountAdjustment:
     accumulation: Accumulation
     epoch_factors: Mapping[str, EpochVarianceFactor]
     ping: PingNoise | None
+    rough: Mapping[str, Roughness]
     drift_figures: DriftFigures
     equations: NormalEquations
     solution: Solution
@@ -118,6 +124,7 @@ def adjust_mount(
     # parameters that the points tell of, and that are known beforehand, are estimated with the last weights
     last, estimated = weighted.last, np.union1d(weighted.estimated, prior.known_parameters)
     factors: dict[str, EpochVarianceFactor] = {}
+    rough: dict[str, Roughness] = {}
     converged = False
     if not weighted.deficient:
         # take the INS's noise from the data: white noise, then drift; further steps have the last weights
@@ -126,17 +133,15 @@ def adjust_mount(
             soundings, surfaces = last.linearisation.sums["mbes"], last.linearisation.state.surfaces
             ping = ping_noise(soundings, surfaces, prior.noise.white, factors["laser"])
             with_noise = partial(with_ping_noise, noise=ping, surfaces=surfaces, white=prior.noise.white)
-            with_pings = soundings.stored(with_noise)
-            last = replace(last, linearisation=last.linearisation.with_sums("mbes", with_pings))
+            last = replace(last, linearisation=last.linearisation.with_sums("mbes", soundings.stored(with_noise)))
             factors["mbes"] = ping.epoch
         noise = noise_seen_by_laser(prior.noise, factors["laser"])
-        reduced = last.reduced(noise.white, estimated)
-        figures = last.drift_figures(noise, prior.drift, estimated, reduced)
-        for closing in range(CLOSING_STEPS):
-            last, solution = last.stepped(figures.noise, estimated, None if closing else reduced)
-            converged = weighted.settled and is_small(solution, CONVERGED)
-            if converged:
-                break
+        for _ in range(ROUGH_ROUNDS if prior.from_start else 1):
+            if prior.from_start:  # a wall that nobody has surveyed may be rough
+                last, rough = with_roughness(last, rough, problem.model.body, gap_s)
+            reduced = last.reduced(noise.white, estimated)
+            figures = last.drift_figures(noise, prior.drift, estimated, reduced)
+            last, converged = _closed(last, figures.noise, estimated, reduced)
     # solve with the equations of all parameters: total covariance and tests need the fixed parameters
     equations = last.equations(figures.noise)
     solution = solve(equations.normal, equations.right, estimated.tolist(), last.prior.normal)
@@ -147,11 +152,21 @@ def adjust_mount(
         accumulation=replace(weighted.accumulation, sums=last.linearisation.sums),
         epoch_factors=factors,
         ping=ping,
+        rough=rough,
         drift_figures=figures,
         equations=equations,
         solution=solution,
-        converged=converged and not solution.deficiency,
+        converged=converged and weighted.settled and not solution.deficiency,
         iterations=weighted.iterations,
         last=last,
         rival=chosen.rival,
     )
+
+
+def _closed(last: Iterate, noise: PoseNoise, estimated: Integers, reduced: ReducedIntervals) -> tuple[Iterate, bool]:
+    """Return the values after steps with the last weights, and whether the last step was small."""
+    for closing in range(CLOSING_STEPS):
+        last, solution = last.stepped(noise, estimated, None if closing else reduced)
+        if is_small(solution, CONVERGED):
+            return last, True
+    return last, False

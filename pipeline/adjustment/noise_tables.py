@@ -34,6 +34,8 @@ def groups_table(adjustment: MountAdjustment) -> pd.DataFrame:
         member = group, Scatter(factor * within.dof, within.dof)
         family = surfaces[number].family
         row = _row(f"{sensor}:{family}", sensor, [member]) | {"family": family, "variance_factor": factor}
+        if sensor in adjustment.rough:
+            row["patch_m"] = adjustment.rough[sensor].patch_m[number]
         if sensor == "mbes" and adjustment.ping is not None:
             effects = adjustment.ping.effects
             row |= {"mean_effect": effects.of_mean[number], "slope_effect": effects.of_slope[number]}

@@ -1,18 +1,22 @@
 """Calibrations from parts of the session: without one pass, from one half of the passes, from near or far passes alone.
 
+At walls that nobody has surveyed also without the soundings on each: what hangs on one wall alone shows here.
+
 The parts need no further reading of the points: they are solved at the final values and with the final weights. White
 noise is eliminated once for all, because no error of a record reaches from one pass into another. A calibration that
 hangs on one pass, or that changes with time or distance, shows here.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from pipeline.adjustment.accumulation import by_divisors
 from pipeline.adjustment.iteration import MountAdjustment
 from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.artefacts.catalogue.results import PARTS
@@ -23,6 +27,7 @@ from pipeline.maths.geometry.passes import pass_of
 from pipeline.maths.mount_parameters import N_MOUNT, PARAMETERS
 
 Integers = NDArray[np.int64]
+NO_WEIGHT = 1e12  # divisor of the weights of soundings that are left out
 APART_M = 0.5  # near and far passes differ by at least this distance
 
 
@@ -65,7 +70,10 @@ def parts_table(problem: CalibrationProblem, adjustment: MountAdjustment, passes
     passes : DataFrame
         Table passes.
     """
+    whole = tuple(passes["pass"].tolist())
     rows = [_row(part, difference) for part, difference in _deviations(problem, adjustment, passes)]
+    for family, difference in _without_faces(problem, adjustment):
+        rows.append(_row(Part(f"without the soundings on {family}", whole), difference))
     return pd.DataFrame(rows, columns=[column.name for column in PARTS.columns])
 
 
@@ -92,6 +100,22 @@ def _deviations(
         solution = solve(equations.normal, equations.right, whole.estimated.tolist())
         if not solution.deficiency:
             yield part, deviation(solution, whole, problem.consider, np.arange(N_MOUNT))
+
+
+def _without_faces(problem: CalibrationProblem, adjustment: MountAdjustment) -> Iterator[tuple[str, Deviation]]:
+    """Yield the deviation without the soundings on each surface, where nobody has surveyed the walls."""
+    whole, last, noise = adjustment.solution, adjustment.last, adjustment.drift_figures.noise
+    if whole.deficiency or not problem.prior.from_start or "mbes" not in last.linearisation.sums:
+        return
+    soundings, surfaces = last.linearisation.sums["mbes"], adjustment.state.surfaces
+    seen = np.unique(soundings.surface).tolist()
+    for number in seen if len(seen) > 1 else ():
+        divisors = np.where(np.arange(len(surfaces)) == number, NO_WEIGHT, 1.0)
+        left = last.linearisation.with_sums("mbes", soundings.changed(partial(by_divisors, divisors=divisors)))
+        equations = replace(last, linearisation=left).equations(noise)
+        solution = solve(equations.normal, equations.right, whole.estimated.tolist())
+        if not solution.deficiency:
+            yield surfaces[number].family, deviation(solution, whole, problem.consider, np.arange(N_MOUNT))
 
 
 def _passes_of(record: Integers, pass_of_record: Integers) -> Integers:

@@ -13,6 +13,7 @@ from pipeline.adjustment.iteration import MountAdjustment
 from pipeline.adjustment.observation_model import N_FEATURES, CurrentValues, ObservationModel
 from pipeline.adjustment.point_sums import SummedBatch, summed
 from pipeline.adjustment.problem import CalibrationProblem
+from pipeline.adjustment.residual_places import heights_on_surface, ranges_on_surface
 from pipeline.adjustment.residual_tables import residual_sample, residuals_table, sampling_step
 from pipeline.adjustment.stored_sums import StoredSums
 from pipeline.artefacts.catalogue.results import PATTERNS
@@ -20,11 +21,11 @@ from pipeline.artefacts.memory import give_back_memory
 from pipeline.artefacts.streams import Batch, Stream, point_array
 from pipeline.config.pool import Adjust
 from pipeline.gps_time import NS
-from pipeline.maths.adjustment.design_matrix import FLATTEST
 from pipeline.maths.adjustment.interval_sums import Intervals, IntervalSums
 from pipeline.maths.adjustment.mean_tests import normal_deviates
 from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.pose_errors import drift_between_passes
+from pipeline.maths.adjustment.profiles import FEWEST_BINS, PATCHES, off_line, profile_of, roughness_allowance
 from pipeline.maths.adjustment.residual_means import (
     BinMean,
     BinnedResiduals,
@@ -115,20 +116,51 @@ def residual_statistics(
         by_face = _kept(read, pieces, samples)
         sums_by_face[sensor] = StoredSums.of(by_face, N_FEATURES[sensor])
         give_back_memory()
+        of_surface, of_face = _allowances(problem, adjustment, sensor, pieces.get("height", []))
         for variable, parts in pieces.items():
             sums = merged_residual_sums(parts)
             if variable == "pass":
                 pass_means |= {(sensor, *mean.key): mean for mean in bin_means(sums)}
             names = problem.model.faces.names if variable == "height" else families
-            tested = tested_means(sums, COMPARED.get(variable, "bins"))
-            patterns += [_row(variable, sensor, names[mean.key[0]], mean) for mean in tested]
+            compared = COMPARED.get(variable, "bins")
+            allowed_m = of_face if variable == "height" else of_surface
+            # a pass is compared with others of the same wall, which is as rough to them
+            tolerated = settings.test_tolerance_m + (0.0 * allowed_m if compared == "rest" else allowed_m)
+            tested = tested_means(sums, compared)
+            patterns += [
+                _row(variable, sensor, names[mean.key[0]], mean) | {"tolerated_m": tolerated[mean.key[0]]}
+                for mean in tested
+            ]
     patterns += _drift_rows(problem, adjustment, passes)
     return ResidualStatistics(
         pass_means=pass_means,
-        patterns=_patterns_table(patterns, settings.test_tolerance_m),
+        patterns=_patterns_table(patterns),
         residuals=residuals_table(samples),
         sums_by_face=with_shared_noise(problem, adjustment, sums_by_face),
     )
+
+
+def _allowances(
+    problem: CalibrationProblem, adjustment: MountAdjustment, sensor: str, heights: list[ResidualSums]
+) -> tuple[Array, Array]:
+    """Return what a mean residual on each surface (s,), and at a height of each face (f,), may be larger by, m.
+
+    It is zero but for walls that nobody has surveyed, which may be rough; ``heights``: sums by face and height.
+    """
+    faces, rough = problem.model.faces, adjustment.rough.get(sensor)
+    if rough is None:
+        return np.zeros(len(adjustment.state.surfaces)), np.zeros(len(faces.names))
+    of_surface = PATCHES * rough.patch_m
+    of_face = of_surface[faces.surface]
+    by_face: dict[int, list[BinMean]] = {}
+    for mean in bin_means(merged_residual_sums(heights)):
+        by_face.setdefault(mean.key[0], []).append(mean)
+    for face, means in by_face.items():
+        if len(means) >= FEWEST_BINS:
+            number, value, _ = profile_of(means)
+            of_face[face] = roughness_allowance(float(rough.patch_m[faces.surface[face]]), off_line(number, value))
+    np.maximum.at(of_surface, faces.surface, of_face)
+    return of_surface, of_face
 
 
 def _kept(
@@ -177,43 +209,25 @@ def _variables(
 ) -> Iterator[tuple[str, Array | Integers]]:
     """Yield each variable by which residuals are binned: its name, and its values (n,) for the points.
 
-    Distance and height above the water are those of the place where the ray meets the surface. By the measured range
-    the noise would choose the bin: of a wall that begins at 4.0 m, only points that are measured too near lie below
-    4 m. On bottoms the cosine n · d is positive: their family's normal is that of the tops.
+    Distance and height above the water are those of the place where the ray meets the surface
+    (:mod:`~pipeline.adjustment.residual_places`).
 
     A step at a height tells what disturbs a sensor near the water, or where a face ends. Each face is compared with
     itself, because faces end at different heights. On a level face the height is that of the drift; it has no test.
     """
-    batch, v_m, cosine = observed.points, observed.observed[0], observed.observed[-1]
-    own = point_array(batch, f"{sensor}_m")
-    range_m = np.sqrt(own[:, 0] ** 2 + own[:, 1] ** 2 + own[:, 2] ** 2)
-    reached_m = range_m - v_m / np.copysign(np.maximum(np.abs(cosine), FLATTEST), cosine)
+    batch, own = observed.points, point_array(observed.points, f"{sensor}_m")
+    range_m, reached_m = ranges_on_surface(sensor, observed)
     angle = np.degrees(np.arcsin(own[:, 2] / range_m) if sensor == "laser" else receive_angle(own))
     yield "pass", batch["pass"].astype(np.int64)
     yield "face", batch["face"].astype(np.int64)
     yield "angle", angle
     yield "distance", reached_m
-    yield "height", _heights(model, sensor, observed, state, reached_m / range_m)
+    yield "height", heights_on_surface(model, sensor, observed, state)
     yield "time", batch["t_ns"] // NS
     if sensor == "mbes":
         yield "step", angle
         for name, pings in CYCLES.items():
             yield name, batch["ping"] % pings
-
-
-def _heights(model: ObservationModel, sensor: str, observed: SummedBatch, state: State, share: Array) -> Array:
-    """Return the heights (n,) m above the water of points on the rays, at a share (n,) of the measured range.
-
-    The sensor's height between two records is linear in time here: to a millimetre, where a bin is a decimetre.
-    """
-    points, body, record = observed.points, model.body, observed.record
-    measured = model.points_in_target(points, state)[:, 2] if sensor == state.calibrated else points["z_target_m"]
-    lever_arm = body.lever_arm(sensor, state)
-    used = slice(int(record.min(initial=0)), int(record.max(initial=0)) + 2)
-    at_records = body.trajectory.positions_m[used, 2] + body.trajectory.R_frame_from_body[used, 2] @ lever_arm
-    before, after = (at_records[record - used.start + k] for k in (0, 1))
-    start = before + observed.share * (after - before)
-    return np.asarray(start + share * (measured - start) - model.wet_heights_m[1])
 
 
 def _row(variable: str, sensor: str, family: str, mean: BinMean) -> Row:
@@ -243,15 +257,14 @@ def _drift_rows(problem: CalibrationProblem, adjustment: MountAdjustment, passes
     return [
         {"by": "drift", "sensor": "ins", "family": name, "low": float(number), "width": 1.0}
         | {"count": int(np.sum(pass_of_knot == number))}
-        | {"mean_m": difference[k], "sigma_mean_m": sigma[k], "dof": KNOWN}
+        | {"mean_m": difference[k], "sigma_mean_m": sigma[k], "dof": KNOWN, "tolerated_m": 0.0}
         for number, difference, sigma in zip(by_pass.passes, by_pass.difference, by_pass.sigma, strict=True)
         for name, k in TURNS.items()
         if sigma[k] > 0
     ]
 
 
-def _patterns_table(rows: list[Row], tolerance_m: float) -> pd.DataFrame:
+def _patterns_table(rows: list[Row]) -> pd.DataFrame:
     table = pd.DataFrame(rows, columns=[column.name for column in PATTERNS.columns])
-    mean, sigma, dof = (table[name].to_numpy(np.float64) for name in ("mean_m", "sigma_mean_m", "dof"))
-    tolerated = np.where(table["by"] == "drift", 0.0, tolerance_m)
-    return table.assign(normalised=normal_deviates(mean, sigma, dof, tolerated))
+    figures = (table[name].to_numpy(np.float64) for name in ("mean_m", "sigma_mean_m", "dof", "tolerated_m"))
+    return table.assign(normalised=normal_deviates(*figures))

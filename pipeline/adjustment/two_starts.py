@@ -10,6 +10,7 @@ with the smaller sum of squares, both by the same weights, since each iteration 
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +19,13 @@ from pipeline.adjustment.accumulation import accumulate
 from pipeline.adjustment.iterate import Iterate
 from pipeline.adjustment.observation_model import CurrentValues
 from pipeline.adjustment.problem import CalibrationProblem
+from pipeline.adjustment.wall_roughness import with_roughness
 from pipeline.adjustment.weighted_iteration import IterationSettings, WeightedIteration, weighted_iteration
 from pipeline.artefacts.streams import Stream
 from pipeline.maths.adjustment.mirrored_mount import mirrored_mount
 from pipeline.maths.adjustment.normal_equations import Linearisation
+from pipeline.maths.adjustment.ping_noise import with_design_effects
+from pipeline.maths.adjustment.roughness import Roughness
 from pipeline.maths.adjustment.solution import solve
 from pipeline.maths.adjustment.weighting import Weighting
 from pipeline.maths.comparison import mount_error
@@ -55,7 +59,8 @@ def chosen_iteration(
 ) -> ChosenIteration:
     """Return the iteration with the smaller sum of squares; parameters as for :func:`weighted_iteration`."""
     first = weighted_iteration(problem, streams, settings, gap_s)
-    mirrored = None if first.deficient or "mbes" not in streams else mirrored_mount(first.last.linearisation)
+    may_differ = problem.prior.from_start and "mbes" in streams and not first.deficient
+    mirrored = None if not may_differ else mirrored_mount(first.last.linearisation)
     if mirrored is None:
         return ChosenIteration(first)
     coarse = problem.model.coarse
@@ -64,14 +69,14 @@ def chosen_iteration(
     if second.deficient or not second.settled:
         return ChosenIteration(first)
     apart = _apart(first, second)
-    squares, covariance = _minimum(first, problem, streams, first.weighting)
+    _, rough = with_roughness(first.last, {}, problem.model.body, gap_s)
+    squares, covariance = _minimum(first, problem, streams, first.weighting, rough)
     if float(apart @ np.linalg.solve(covariance, apart)) < SAME**2:
         return ChosenIteration(first)
-    excess = _minimum(second, problem, streams, first.weighting)[0] - squares
-    strength = float(np.sqrt(abs(excess)))
+    excess = _minimum(second, problem, streams, first.weighting, rough)[0] - squares
     if excess > 0 and first.settled:
-        return ChosenIteration(first, Rival(apart, strength))
-    return ChosenIteration(second, Rival(-apart, strength))
+        return ChosenIteration(first, Rival(apart, float(np.sqrt(excess))))
+    return ChosenIteration(second, Rival(-apart, float(np.sqrt(max(-excess, 0.0)))))
 
 
 def _apart(one: WeightedIteration, other: WeightedIteration) -> Array:
@@ -81,11 +86,19 @@ def _apart(one: WeightedIteration, other: WeightedIteration) -> Array:
 
 
 def _minimum(
-    weighted: WeightedIteration, problem: CalibrationProblem, streams: Mapping[str, Stream], weighting: Weighting
+    weighted: WeightedIteration,
+    problem: CalibrationProblem,
+    streams: Mapping[str, Stream],
+    weighting: Weighting,
+    rough: Mapping[str, Roughness],
 ) -> tuple[float, Array]:
-    """Return the least sum of squares by these weights, and the random covariance (6, 6) of the mount there."""
+    """Return the least sum of squares by these weights, and the random covariance (6, 6) of the mount there.
+
+    On a rough wall the soundings of a patch count as few: else any excess would be significant.
+    """
     state, drift = weighted.last.linearisation.state, weighted.last.drift
-    sums = accumulate(streams, problem.model, CurrentValues(state, drift, weighting)).sums
+    read = accumulate(streams, problem.model, CurrentValues(state, drift, weighting)).sums
+    sums = {name: one.stored(partial(with_design_effects, effects=rough[name].effects)) for name, one in read.items()}
     linearisation = Linearisation(sums, state, problem.model.body, drift, problem.mapper)
     at_values = Iterate(linearisation, drift, problem.prior.priors)
     noise = replace(problem.prior.noise, white=weighting.white)

@@ -133,6 +133,34 @@ class ParquetPart:
 
 
 @dataclass(frozen=True)
+class FilteredPart:
+    """A part with those rows alone that a picklable function of a batch keeps."""
+
+    part: Part
+    keep: Callable[[Batch], np.ndarray]
+
+    @property
+    def name(self) -> str:
+        """Name of the part."""
+        return self.part.name
+
+    def only(self, columns: tuple[str, ...]) -> "FilteredPart":
+        """Return the part with these columns alone, which must contain those that the function needs."""
+        return replace(self, part=only(self.part, columns))
+
+    def pieces(self) -> list["FilteredPart"]:
+        """Return the part in pieces of consecutive rows."""
+        return [replace(self, part=piece) for piece in pieces(self.part)]
+
+    def chunks(self) -> Iterator[Chunk]:
+        """Yield the rows that are left; no chunk is empty."""
+        for chunk in self.part.chunks():
+            kept = self.keep(chunk.columns)
+            if kept.any():
+                yield Chunk({name: values[kept] for name, values in chunk.columns.items()})
+
+
+@dataclass(frozen=True)
 class MemoryPart:
     """A batch in memory, for series of simulated sessions and for tests."""
 
@@ -170,6 +198,10 @@ class Stream:
     def only(self, columns: Sequence[str]) -> "Stream":
         """Return the stream with these columns alone, where it is read from files."""
         return replace(self, parts=tuple(only(part, tuple(columns)) for part in self.parts))
+
+    def filtered(self, keep: Callable[[Batch], np.ndarray]) -> "Stream":
+        """Return the stream with those rows alone that a picklable function of a batch keeps."""
+        return replace(self, parts=tuple(FilteredPart(part, keep) for part in self.parts))
 
     def batches(self) -> Iterator[Batch]:
         """Yield all rows in order, batch by batch, with one batch in memory."""

@@ -17,6 +17,7 @@ from pipeline.artefacts.catalogue.results import (
     FREED,
     GEOMETRY,
     GROUPS,
+    LEFT_OUT,
     PARTS,
     PATTERNS,
     SETS,
@@ -48,5 +49,6 @@ class Evidence:
     parts: Annotated[pd.DataFrame, PARTS]
     cells: Annotated[pd.DataFrame, CELLS]
     groups: Annotated[pd.DataFrame, GROUPS]
+    left_out: Annotated[pd.DataFrame, LEFT_OUT]
     summary: Annotated[pd.DataFrame, ADJUST_SUMMARY]
     corrections: Annotated[pd.DataFrame | None, CORRECTIONS] = None

@@ -3,13 +3,10 @@
 import numpy as np
 import pandas as pd
 
+from pipeline.adjustment.wet_planes import FEWEST_SOUNDINGS, LARGEST_SHARE_OF_GATE
 from pipeline.report.noise_warnings import POINTS
 from pipeline.report.reason_codes import ReasonCode, Statement
 
-MIN_SOUNDINGS = 30  # on a family of faces: with fewer its labels are not reliable
-# Largest RMS of a family's residuals as a share of the gate. Noise of which a gate leaves k sigmas on either side has
-# 0.20 for k = 5, 0.33 for 3, 0.39 for 2.5, 0.44 for 2; without any centre, spread over the gate, 0.58.
-MAX_SHARE_OF_GATE = 0.4
 MAX_LABEL_CHANGE = 0.01  # share of the labels that the last provisional adjustment may change; usual: 0.001
 
 
@@ -23,7 +20,7 @@ def too_few_soundings(cells: pd.DataFrame) -> list[Statement]:
             "tells why so few hit it)",
         )
         for family, number in count.items()
-        if number < MIN_SOUNDINGS
+        if number < FEWEST_SOUNDINGS
     ]
 
 
@@ -42,7 +39,7 @@ def noise_cut_by_gate(cells: pd.DataFrame, gates_m: dict[str, float]) -> list[St
     for names, rows in cells.groupby(["sensor", "family"], sort=True):
         sensor, family = map(str, names)
         rms_m = float(np.sqrt(np.average(rows["rms_m"] ** 2, weights=rows["count"])))
-        if rms_m > MAX_SHARE_OF_GATE * gates_m[sensor]:
+        if rms_m > LARGEST_SHARE_OF_GATE * gates_m[sensor]:
             words = (
                 f"{POINTS[sensor]} on {family} scatter by {1000 * rms_m:.0f} mm, and those more than "
                 f"{1000 * gates_m[sensor]:.0f} mm off its faces are not used: the result may be drawn to where the "

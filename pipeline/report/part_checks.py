@@ -47,15 +47,22 @@ def disagreeing_parts(parts: pd.DataFrame, level: float) -> list[Statement]:
     if not len(parts) or parts["normalised"].max() <= joint_limit(len(parts), level):
         return []
     row = max(parts.to_dict("records"), key=lambda part: float(part["normalised"]))
-    off = [(abs(row[f"change_{name}"] / row[f"sigma_{name}"]), name, unit) for name, _, _, unit in PARAMETERS]
-    _, name, unit = max(entry for entry in off if np.isfinite(entry[0]))
+    each = [(abs(row[f"change_{name}"] / row[f"sigma_{name}"]), name, unit) for name, _, _, unit in PARAMETERS]
+    _, name, unit = max(entry for entry in each if np.isfinite(entry[0]))
     change, sigma = (_with_unit(row[f"{kind}_{name}"], unit) for kind in ("change", "sigma"))
-    where = row["part"] if row["part"].startswith("without") else f"from the {row['part']} alone"
-    words = (
-        f"{where} {name} would be another by {change} ± {sigma} ({row['normalised']:.1f} sigma over all parameters): "
-        "something changed during the session (the bracket, a clock, the water, the INS's solution); sail again, or "
-        "calibrate the passes apart to find which of them is wrong"
-    )
+    if "soundings" in row["part"]:  # those on a face
+        cause = (
+            "that wall or another does not go on below the water as above: see what is there, and strike it "
+            "(target.strike)"
+        )
+    else:
+        cause = (
+            "something changed during the session (the bracket, a clock, the water, the INS's solution); sail again, "
+            "or calibrate the passes apart to find which of them is wrong"
+        )
+    where = f"{row['part']}," if row["part"].startswith("without") else f"from the {row['part']} alone"
+    off = f"{name} would be another by {change} ± {sigma} ({row['normalised']:.1f} sigma over all parameters)"
+    words = f"{where} {off}: {cause}"
     return [Statement(ReasonCode.PARTS_DISAGREE, words)]
 
 

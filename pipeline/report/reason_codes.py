@@ -38,6 +38,7 @@ class ReasonCode(StrEnum):
     NO_COVARIANCE = "no_covariance", "the adjustment has no covariance"
     SIGMA_ABOVE_LIMIT = "sigma_above_limit", "the total sigma of a mount parameter is above verdict's limit"
     SOUNDINGS_ABOVE_LIMIT = "soundings_above_limit", "the mount alone takes too much of what soundings may be wrong by"
+    FACES_IN_DOUBT = "faces_in_doubt", "unsurveyed faces contradict one another below the water: one is wrong"
     ESTIMATE_OFF_SETTINGS = "estimate_off_settings", "a parameter of adjust.free is significantly not as configured"
 
     # Mean residuals beyond the tolerance: these reject.
@@ -75,6 +76,8 @@ class ReasonCode(StrEnum):
     MANY_OUTLIERS = "many_outliers", "an unusual share of the observations was cut as outliers"
     TARGET_OFF_ORIGIN = "target_off_origin", "the target stands far from target.origin, or out of plumb"
     TARGET_FOUND = "target_found", "the target was found in laser points, and its faces go on below the water unproven"
+    FACE_LEFT_OUT = "face_left_out", "soundings on a face are left out: below the water it does not go on as above"
+    ROUGH_WALL = "rough_wall", "patches of the walls stand off their planes, and the sigmas allow for it"
     PASS_WITHOUT_SOUNDINGS = "pass_without_soundings", "in some passes the laser alone saw the target"
     PASS_WITHOUT_LASER = "pass_without_laser", "in some passes the sonar alone saw the target"
     LENGTH_OFF_DESIGN = "length_off_design", "b or e of the target is measured otherwise than designed"

@@ -84,6 +84,12 @@ REMEDIES: dict[Code, Remedy] = {
         "allows at verdict.depth_m and verdict.swath_deg.",
         "As for sigma_above_limit; or survey with the beams nearer the vertical, or in less depth, and state that.",
     ),
+    Code.FACES_IN_DOUBT: Remedy(
+        "Below the water one of the walls does not go on as above, by more than as_built says. With few walls any of "
+        "them may be the one, or a sensor is wrong.",
+        "See what is there, and strike that face (target.strike). Pass more walls: of four or more the program finds "
+        "the false one by itself.",
+    ),
     Code.ESTIMATE_OFF_SETTINGS: Remedy(
         "A parameter that you named in adjust.free came out significantly different from session.yaml.",
         "Find the cause, enter the value found (mbes.latency_s, laser.latency_s, mbes.sound_speed_m_s), run again, and "
@@ -211,6 +217,17 @@ REMEDIES: dict[Code, Remedy] = {
         "Nobody drew or surveyed the target: its faces are planes in the laser's points, continued straight down.",
         "See that each is a wall that goes on below the water, and no fender, ladder or boat; strike the others "
         "(target.strike). Look at the residuals by height, and state in as_built how the walls may stand there.",
+    ),
+    Code.FACE_LEFT_OUT: Remedy(
+        "Below the water a wall is not the plane that it is above: a ledge, a footing, a bulge, growth; or near the "
+        "water something stands before it, or splash. The points there are left out, and the rest is adjusted without "
+        "them.",
+        "See what is there, at low water or with a camera. If the sigmas are too large without it, pass more walls.",
+    ),
+    Code.ROUGH_WALL: Remedy(
+        "Mussels, weed, stones, joints: patches of a wall stand off its plane, and every pass sees the same patches. "
+        "More soundings on them tell nothing new.",
+        "Clean the wall, or pass more and longer walls. More passes of the same wall do not help.",
     ),
     Code.PASS_WITHOUT_SOUNDINGS: Remedy(
         "In a pass the laser saw the target and the sonar has no soundings on it, or none at all: a file of the sonar "

@@ -27,13 +27,11 @@ class ResidualTests:
     patterns : the table
     face_names : names of the faces by number
     shape : names of the settings of the target's shape, in words
-    tolerance_m : the tolerance of the tests
     """
 
     patterns: pd.DataFrame
     face_names: list[str]
     shape: str
-    tolerance_m: float
 
 
 @dataclass(frozen=True)
@@ -47,7 +45,7 @@ class ExceededTests:
     def outcome(self, row: Row) -> str:
         """Return in words how far a row exceeds the tolerance, and the limit."""
         excess = abs(float(row["normalised"]))
-        beyond = f"{excess:.1f} sigma beyond {1000 * self.tests.tolerance_m:g} mm"
+        beyond = f"{excess:.1f} sigma beyond {round(1000 * float(row['tolerated_m']), 1):g} mm"
         if row["by"] == "drift":
             beyond = f"{excess:.1f} times the drift that is allowed"
         return f"{beyond}, limit {self.limit:.1f}"

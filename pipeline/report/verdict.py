@@ -9,10 +9,12 @@ The limits are defined at these places (paths from ``pipeline/``):
 * convergence: ``max_iterations`` of class ``Adjust`` of config/pool.py, ``SETTLED`` of
   adjustment/weighted_iteration.py, ``CONVERGED`` and ``CLOSING_STEPS`` of adjustment/iteration.py;
 * another minimum of the adjustment: ``SAME`` of adjustment/two_starts.py, ``LEAST_STRENGTH`` of ambiguities.py;
-* number of soundings on a family, and its noise against the gate: ``MIN_SOUNDINGS`` and ``MAX_SHARE_OF_GATE`` of
-  label_checks.py;
+* number of soundings on a family, and its noise against the gate: ``FEWEST_SOUNDINGS`` and ``LARGEST_SHARE_OF_GATE``
+  of adjustment/wet_planes.py; faces in doubt at unsurveyed walls: ``LEVEL``, ``NEARLY_AS_WELL`` and ``ROUNDS`` there,
+  ``CERTAIN`` of adjustment/wall_stripes.py;
 * mean residuals: ``test_level`` and ``test_tolerance_m`` of class ``Adjust`` of config/pool.py; ``FEWEST``,
-  ``FEWEST_SLOTS`` and ``FEWEST_DOF`` of maths/adjustment/residual_means.py decide which means are tested;
+  ``FEWEST_SLOTS`` and ``FEWEST_DOF`` of maths/adjustment/residual_means.py decide which means are tested; on rough
+  walls ``PATCHES`` of maths/adjustment/profiles.py;
 * the mount from parts of the session: ``test_level`` of class ``Adjust``, ``APART_M`` of adjustment/parts.py, and
   ``SAME`` of maths/adjustment/parts.py;
 * drift of the INS, beside deviating residuals or a suspected cause: ``MAX_DRIFT_RATIO`` of drift_check.py;
@@ -58,6 +60,7 @@ from pipeline.report.suspected_causes import (
     significance_limit,
     suspected_causes,
 )
+from pipeline.report.wall_checks import faces_in_doubt
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,7 +71,6 @@ class Criteria:
     ----------
     limits : limits of the total sigmas
     test_level : level of the tests of mean residuals
-    tolerance_m : size of a mean residual that the tests tolerate
     method : the method that is the result
     search : the search for the provisional mount
     shape : names of the settings of the target's shape, in words
@@ -79,7 +81,6 @@ class Criteria:
 
     limits: VerdictLimits
     test_level: float
-    tolerance_m: float
     method: Method
     search: MountSearch
     shape: str
@@ -119,7 +120,7 @@ def rejections(
         reasons.append(Statement(ReasonCode.NOT_CONVERGED, words))
     reasons += ambiguous_minimum(summary)
     gates_m = {"laser": evidence.target_pose["gate_m"].iloc[0], "mbes": evidence.provisional_mount["gate_m"].iloc[0]}
-    reasons += too_few_soundings(evidence.cells)
+    reasons += too_few_soundings(evidence.cells) + faces_in_doubt(evidence.left_out)
     reasons += _residual_reasons(evidence, criteria, drift_check)
     reasons += noise_cut_by_gate(evidence.cells, gates_m)  # a face that is off scatters too, and is named before
     reasons += disagreeing_parts(evidence.parts, criteria.test_level)
@@ -178,7 +179,6 @@ def _residual_tests(evidence: Evidence, criteria: Criteria) -> ResidualTests:
         patterns=evidence.patterns,
         face_names=evidence.faces["name"].tolist(),
         shape=criteria.shape,
-        tolerance_m=criteria.tolerance_m,
     )
 
 

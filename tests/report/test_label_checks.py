@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pipeline.report.label_checks import MAX_LABEL_CHANGE, MAX_SHARE_OF_GATE, noise_cut_by_gate, unsettled_labels
+from pipeline.report.label_checks import LARGEST_SHARE_OF_GATE, MAX_LABEL_CHANGE, noise_cut_by_gate, unsettled_labels
 from pipeline.report.reason_codes import ReasonCode
 
 
@@ -26,7 +26,7 @@ def test_noise_that_the_gate_cuts_off_is_a_reason(gate_in_sigmas: float, cut: bo
 
 def test_each_sensor_has_its_own_gate() -> None:
     cells = pd.DataFrame(
-        [("laser", "H", 50, 0.05 * (MAX_SHARE_OF_GATE + 0.01)), ("mbes", "H", 50, 0.03)],
+        [("laser", "H", 50, 0.05 * (LARGEST_SHARE_OF_GATE + 0.01)), ("mbes", "H", 50, 0.03)],
         columns=["sensor", "family", "count", "rms_m"],
     )
     (found,) = noise_cut_by_gate(cells, {"laser": 0.05, "mbes": 0.1})

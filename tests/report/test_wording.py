@@ -249,6 +249,9 @@ OTHERS: list[tuple[Callable[[], Iterable[Statement]], ReasonCode, str]] = [
 ]
 
 
+OF_WALLS = {ReasonCode.FACE_LEFT_OUT, ReasonCode.ROUGH_WALL}  # test_wall_checks.py
+
+
 def _one(check: Statement | None) -> list[Statement]:
     return [] if check is None else [check]
 
@@ -281,7 +284,7 @@ def test_words_and_codes_are_parallel_lists() -> None:
 
 
 def test_no_code_is_without_words_and_a_meaning() -> None:
-    assert {code for _, code, _ in [*REASONS, *OTHERS]} == set(ReasonCode)
+    assert {code for _, code, _ in [*REASONS, *OTHERS]} | OF_WALLS == set(ReasonCode)
     for code in ReasonCode:
         assert code.value == code.name.lower() == str(code)
         assert code.meaning

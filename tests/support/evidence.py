@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from pipeline.artefacts.catalogue.results import LEFT_OUT
 from pipeline.config.verdict import VerdictLimits
 from pipeline.maths.mount_parameters import MOUNT_NAMES
 from pipeline.report.ambiguities import MountSearch
@@ -22,7 +23,7 @@ OFF = {"normalised": 3.5}  # beyond the limit of one row, 3.29
 PASS_3 = {"by": "pass", "low": 3.0, "mean_m": -0.012, "normalised": -4.0}
 SEARCH = MountSearch(sensor="mbes", max_angle_deg=4.5, max_lever_arm_m=0.45)
 ADJUSTED = Criteria(
-    limits=VerdictLimits(), test_level=0.001, tolerance_m=0.003, method="adjustment", search=SEARCH,
+    limits=VerdictLimits(), test_level=0.001, method="adjustment", search=SEARCH,
     shape="target.a, b, c, e and low_side",
 )  # fmt: skip
 
@@ -45,6 +46,7 @@ def evidence(
     parts: Mapping[str, Any] | None = None,
     count: int = 500,
     rms_m: float = 0.01,
+    left_out: Sequence[Mapping[str, Any]] = (),
 ) -> Evidence:
     """Tables of a session that is accepted, with changes to their rows."""
     pose_row = {
@@ -72,7 +74,7 @@ def evidence(
     nothing |= {"expected": 1.4e-4, "value": 2e-4, "sigma": 1e-4, "by_session": np.nan}
     of_set = {"set": "wet_bows", "parameters": "wet_P2_bow", "strength": 0.0, "by_session": np.nan}
     pattern = {"by": "angle", "sensor": "mbes", "family": "P2", "low": 20.0, "width": 2.0, "mean_m": 0.001}
-    pattern["sigma_mean_m"] = 1e-4
+    pattern |= {"sigma_mean_m": 1e-4, "tolerated_m": 0.003}
     geometry = [("remedy", "two more passes at 3 m would do")]
     tables: dict[str, Any] = {field.name: pd.DataFrame() for field in fields(Evidence)}
     part: dict[str, Any] = {"part": "without pass 2", "passes": "0 1 3", "normalised": 1.0, "dof": 6}
@@ -91,9 +93,18 @@ def evidence(
         "freed": freed_table(nothing | dict(freed or {})),
         "sets": pd.DataFrame([of_set | dict(changes) for changes in sets]),
         "estimate": pd.DataFrame({"unknown": MOUNT_NAMES, "sigma": 1e-4, "sigma_total": 1e-4}),
+        "left_out": left_out_table(*left_out),
         "patterns": pd.DataFrame([pattern | {"normalised": 0.3} | dict(changes) for changes in patterns]),
     }
     return Evidence(**tables)
+
+
+def left_out_table(*rows: Mapping[str, Any]) -> pd.DataFrame:
+    """The table of what is left out; a face at all its heights, by the sonar."""
+    usual = {"family": "north", "why": "off", "points": 900, "sensor": "mbes", "low_m": -np.inf, "high_m": np.inf}
+    usual |= {"unknown": "wet_north_shift", "value": 0.094, "sigma": 0.009}
+    columns = [column.name for column in LEFT_OUT.columns]
+    return pd.DataFrame([usual | dict(row) for row in rows], columns=columns)
 
 
 def freed_table(*rows: Mapping[str, Any]) -> pd.DataFrame:

@@ -131,7 +131,12 @@ REASONS: list[tuple[dict[str, Any], ReasonCode, str]] = [  # evidence, code, wor
     (
         {"parts": {"normalised": 4.5, "change_x": 0.0031}},
         ReasonCode.PARTS_DISAGREE,
-        "without pass 2 x would be another by 3.1 mm ± 1.0 mm (4.5 sigma over all parameters): something changed",
+        "without pass 2, x would be another by 3.1 mm ± 1.0 mm (4.5 sigma over all parameters): something changed",
+    ),
+    (
+        {"parts": {"part": "without the soundings on north", "normalised": 4.5, "change_x": 3.1e-3}},
+        ReasonCode.PARTS_DISAGREE,
+        "without the soundings on north, x would be another by 3.1 mm ± 1.0 mm (4.5 sigma over all parameters): that",
     ),
     (
         {"parts": {"part": "near passes", "normalised": 4.5, "change_yaw": -0.05}},
@@ -202,5 +207,10 @@ REASONS: list[tuple[dict[str, Any], ReasonCode, str]] = [  # evidence, code, wor
         {"freed": {"unknown": "wet_H_shift", "value": 0.02}},
         ReasonCode.SUSPECTED_CAUSE,
         "the target: its wet faces that are horizontal lie higher by +20.0 ± 0.1 mm; check its shape",
+    ),
+    (
+        {"left_out": [{"why": "doubt"}]},
+        ReasonCode.FACES_IN_DOUBT,
+        "below the water the faces contradict one another. It may be this: north stands there 94 ± 9 mm farther toward",
     ),
 ]

@@ -46,7 +46,8 @@ GEOMETRY = Artefact(
 PARTS = Artefact(
     "adjust", "parts", "table", "change of the mount if only a part of the session is used, against the whole",
     (
-        Column("part", TEXT, "", "without pass n; first half, second half (of the passes); near passes, far passes"),
+        Column("part", TEXT, "", "without pass n; first half, second half (of the passes); near passes, far passes; at "
+               "unsurveyed walls: without the soundings on a family"),
         Column("passes", TEXT, "", "numbers of the passes that are used"),
         Column("normalised", F64, "1", "normal deviate of all changes together"),
         Column("dof", I64, "1", "number of directions in which the part can differ from the whole"),
@@ -109,6 +110,22 @@ SETS = Artefact(
                "strength with the drift as configured, if a parameter or set explains more than any drift (else NaN)"),
     ),
 )
+LEFT_OUT = Artefact(
+    "adjust", "left_out", "table", "unsurveyed faces, or heights of them, whose points are left out; faces in doubt",
+    (
+        Column("family", TEXT, "", "family of faces"),
+        Column("why", TEXT, "", "few: too few soundings; scatter: they fill the gate; step: they stand off those at "
+               "other heights; off: the others contradict them; doubt: one of these is wrong, and all are used"),
+        Column("points", I64, "", "number of the sensor's points"),
+        Column("sensor", TEXT, "", "laser or mbes"),
+        Column("low_m", F64, "m", "height above the water from which on they are left out (-inf: from the lowest)"),
+        Column("high_m", F64, "m", "height up to which they are (inf: to the highest)"),
+        Column("unknown", TEXT, "", "its parameter that is farthest off"),
+        Column("value", F64, "rad or m",
+               "by how much, if the other faces are as they are known to be; step: by how much they stand off"),
+        Column("sigma", F64, "rad or m", "standard deviation of it"),
+    ),
+)
 SURFACES = Artefact(
     "adjust", "surfaces", "table", "the adjusted surfaces, shared by both sensors",
     (
@@ -131,6 +148,7 @@ GROUPS = Artefact(
         Column("reduced", I64, "1", "observations whose weight was reduced"),
         Column("sensor", TEXT, "", "laser or mbes"), Column("family", TEXT, "", "P1, P2, P3 or H; else empty"),
         Column("sigma", F64, "1", "standard deviation of the variance factor"),
+        Column("patch_m", F64, "m", "by family, at unsurveyed walls: RMS by which patches stand off (roughness)"),
         Column("mean_effect", F64, "1", "sonar, by family: variance of a ping's mean / that of independent beams"),
         Column("slope_effect", F64, "1", "the same of its slope; both are 1 where they are not certainly larger"),
     ),
@@ -168,6 +186,7 @@ PATTERNS = Artefact(
         Column("sigma_mean_m", F64, "m (drift: rad)",
                "its standard deviation, from the scatter of time slots; drift: by the figures of ins.drift"),
         Column("dof", F64, "1", "degrees of freedom of this standard deviation"),
+        Column("tolerated_m", F64, "m", "tolerance: adjust.test_tolerance_m, more on a rough wall; drift: 0"),
         Column("normalised", F64, "1", "normal deviate of the part beyond the tolerance (drift: of all of it), signed"),
     ),
 )

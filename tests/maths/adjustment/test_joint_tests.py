@@ -6,6 +6,7 @@ from scipy import stats
 
 from pipeline.maths.adjustment.joint_tests import joint_test, normal_deviate_of
 from pipeline.maths.adjustment.parameter_tests import prior_parameter_tests, single_parameter_tests
+from pipeline.maths.adjustment.plane_tests import plane_test
 from pipeline.maths.adjustment.solution import ConsiderErrors, Solution, solve
 
 Array = np.ndarray
@@ -122,3 +123,32 @@ def test_the_deviate_goes_on_where_the_probability_cannot_be_computed(dof: int) 
     assert np.all((steps > 0.99) & (steps < 1.2))
     if dof == 1:
         np.testing.assert_allclose(found, np.sqrt(falls), rtol=1e-9)
+
+
+# --- wet faces: the same test, with the errors of the fixed parameters ---
+def test_a_plane_test_falls_as_the_joint_test_and_finds_the_error() -> None:
+    case = Case(seed=3)
+    case.known[[2, 3]] += [40.0, -30.0]  # what is believed of them is far off
+    (normal, right), (solution, deviation) = case.equations(), case.solution()
+    found = plane_test(solution, deviation, NOTHING, [2, 3])
+    assert found.fall == pytest.approx(joint_test(normal, right, solution, deviation, [2, 3]).fall)
+    assert found.statistic == pytest.approx(found.fall)
+    assert found.dof == 2
+    np.testing.assert_allclose(found.error, [-40.0, 30.0], atol=4 * found.sigma.max())
+    assert found.sigma.max() < 2.0
+    assert found.deviate > 8.0
+
+
+def test_errors_of_fixed_parameters_are_no_contradiction() -> None:
+    """With errors of the fixed parameters, T' is chi-squared; T, which takes them as exact, is far larger."""
+    consider, statistics, falls = ConsiderErrors(np.r_[np.zeros(5), 2.0, 2.0, 2.0]), [], []
+    for seed in range(400):
+        truth = np.zeros(NUMBER)
+        truth[FIXED] = 2.0 * np.random.default_rng([seed, 1]).normal(size=3)
+        solution, deviation = Case(seed, truth).solution()
+        found = plane_test(solution, deviation, consider, KNOWN)
+        statistics.append(found.statistic)
+        falls.append(found.fall)
+    assert found.dof == 3
+    assert stats.kstest(statistics, stats.chi2(3).cdf).pvalue > 0.01
+    assert np.mean(falls) > 5

@@ -1,0 +1,40 @@
+"""Places where the rays of a batch meet their surfaces: their distances from the sensor, and their heights.
+
+By the measured range the noise would choose the bin of a residual: of a wall that begins at 4.0 m, only points that are
+measured too near lie below 4 m. On bottoms the cosine n · d is positive: their family's normal is that of the tops.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.adjustment.observation_model import ObservationModel
+from pipeline.adjustment.point_sums import SummedBatch
+from pipeline.artefacts.streams import point_array
+from pipeline.maths.adjustment.design_matrix import FLATTEST
+from pipeline.maths.adjustment.parameters import State
+
+Array = NDArray[np.float64]
+
+
+def ranges_on_surface(sensor: str, observed: SummedBatch) -> tuple[Array, Array]:
+    """Return the measured ranges (n,) m, and those to the surface; ``observed`` has residuals."""
+    v_m, cosine = observed.observed[0], observed.observed[-1]
+    own = point_array(observed.points, f"{sensor}_m")
+    range_m = np.sqrt(own[:, 0] ** 2 + own[:, 1] ** 2 + own[:, 2] ** 2)
+    return range_m, range_m - v_m / np.copysign(np.maximum(np.abs(cosine), FLATTEST), cosine)
+
+
+def heights_on_surface(model: ObservationModel, sensor: str, observed: SummedBatch, state: State) -> Array:
+    """Return the heights (n,) m above the water of the places where the rays meet the surface.
+
+    The sensor's height between two records is linear in time here: to a millimetre, where a bin is a decimetre.
+    """
+    range_m, reached_m = ranges_on_surface(sensor, observed)
+    points, body, record = observed.points, model.body, observed.record
+    measured = model.points_in_target(points, state)[:, 2] if sensor == state.calibrated else points["z_target_m"]
+    lever_arm = body.lever_arm(sensor, state)
+    used = slice(int(record.min(initial=0)), int(record.max(initial=0)) + 2)
+    at_records = body.trajectory.positions_m[used, 2] + body.trajectory.R_frame_from_body[used, 2] @ lever_arm
+    before, after = (at_records[record - used.start + k] for k in (0, 1))
+    start = before + observed.share * (after - before)
+    return np.asarray(start + reached_m / range_m * (measured - start) - model.wet_heights_m[1])

@@ -1,0 +1,45 @@
+"""Profiles of mean residuals over height: a line that a part of the heights cannot move, and the scatter about it.
+
+The line is that of Theil 1950, "A rank-invariant method of linear and polynomial regression analysis": its slope is the
+median of the slopes of all pairs, its place the median of what remains. Up to 29 % of the heights may be wrong without
+moving it far. The scatter is the median absolute deviation times 1.4826, the standard deviation of normal errors.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.maths.adjustment.residual_means import BinMean
+
+Array = NDArray[np.float64]
+FEWEST_BINS = 8  # heights of a face whose profile is judged
+PATCHES = 3.0  # of the RMS of a rough wall's patches, or of its heights: a mean residual may be so much larger
+NORMAL = 1.4826
+
+
+def off_line(place: Array, value: Array) -> Array:
+    """Return the values (n,) at places (n,) less the robust line through them."""
+    i, j = np.triu_indices(len(place), 1)
+    slope = np.median((value[j] - value[i]) / (place[j] - place[i]))
+    return np.asarray(value - slope * place - np.median(value - slope * place))
+
+
+def roughness_allowance(patch_m: float, off_m: Array) -> float:
+    """Return what a height of a rough wall may be off its line by, beyond the tolerance of a smooth one, m.
+
+    Parameters
+    ----------
+    patch_m : float
+        RMS of the wall's patches (:mod:`~pipeline.maths.adjustment.roughness`).
+    off_m : (n,) array
+        What its heights are off their line by.
+    """
+    return PATCHES * max(patch_m, NORMAL * float(np.median(np.abs(off_m))))
+
+
+def profile_of(means: Sequence[BinMean]) -> tuple[Array, Array, Array]:
+    """Return numbers (n,) of the heights, means (n,) m and their sigmas (n,) m."""
+    number = np.array([mean.key[1] for mean in means], dtype=np.float64)
+    value, sigma = (np.array([getattr(mean, name) for mean in means]) for name in ("mean_m", "sigma_mean_m"))
+    return number, value, sigma
