@@ -5,6 +5,7 @@ finds the target in the laser's points and calibrates. Its rows stand in runs/pl
 
     python -m tools.place_campaign [--only wall return ...] [--sessions 60] [--jobs 2] [--resume] > FILE.md
     python -m tools.place_campaign --drawn [...]   # also with the true target drawn: how far the values differ
+    python -m tools.place_campaign --rough [...]   # walls as they are (tools.rough_walls): what is accepted, left out
 """
 
 import argparse
@@ -31,22 +32,28 @@ from tools.campaign_statistics import nse_band
 from tools.campaigns import DRIFT, TASKS_OF_A_WORKER
 from tools.drawn_errors import errors_at
 from tools.places import PLACES, scenario_of_place
+from tools.rough_walls import drawn_into, drawn_names
 from tools.session_rows import NAMES, error_columns
 
 FOLDER = Path("runs/places")
+ROUGH_PLACES = ("slip", "lock", "returns", "slope")
 FIRST_SEED = 70_000
-AS_BUILT = AsBuilt(offset_sigma_m=0.02, angle_sigma_deg=0.1)
-CONFIG: dict[str, Any] = {"target": {"kind": "found", "depth_m": 4.0}, "verdict": {"purpose": "special_order"}}
+AS_BUILT = AsBuilt(offset_sigma_m=0.02, angle_sigma_deg=0.1, bow_sigma_m=0.005)
+TARGET = {"kind": "found", "depth_m": 4.0}
 
 
 @dataclass(frozen=True)
 class Task:
-    """A session: its place, and its seed; whether the plan's sigmas, and the values on the drawn target, are wanted."""
+    """A session: its place, and its seed; whether the plan's sigmas, and the values on the drawn target, are wanted.
+
+    rough: the walls are as they are.
+    """
 
     place: str
     seed: int
     planned: bool = False
     drawn: bool = False
+    rough: bool = False
 
 
 def row_of(task: Task) -> dict[str, Any]:
@@ -55,10 +62,13 @@ def row_of(task: Task) -> dict[str, Any]:
     model = target_of(parse(Scenario, bare, "place").target)
     scenario = scenario_of_place(task.place, {"ins": DRIFT}, errors_at(model, task.seed, AS_BUILT))
     row: dict[str, Any] = {"place": task.place, "seed": task.seed}
+    if task.rough:
+        row |= drawn_into(scenario, task.place, task.seed)
     with tempfile.TemporaryDirectory() as folder:
         file, session, run, config = (Path(folder, name) for name in ("scenario.yaml", "session", "run", "pool.yaml"))
         file.write_text(yaml.safe_dump(scenario), encoding="utf-8")
-        config.write_text(yaml.safe_dump(CONFIG), encoding="utf-8")
+        purpose = "order_1a" if task.rough else "special_order"
+        config.write_text(yaml.safe_dump({"target": TARGET, "verdict": {"purpose": purpose}}), encoding="utf-8")
         _poolcal(["simulate", session, "--scenario", file, "--seed", task.seed], (0,))
         command = ["run", session, "--config", config, "--run", run, "--jobs", "1", "--no-report", "--no-recordings"]
         said = _poolcal(command, (0, 1, 2))
@@ -72,9 +82,20 @@ def row_of(task: Task) -> dict[str, Any]:
             row |= _predicted(session, found, scenario)
         if task.drawn:
             row |= _by_drawing(session, calibration)
+        if task.rough:
+            row |= _left_out(calibration, found["target"], scenario["target"])
     row |= {"verdict": calibration["verdict"], "reasons": " | ".join(calibration["reasons"])}
     row |= {"codes": " ".join(dict.fromkeys(calibration["reason_codes"])), "faces": len(found["target"]["faces"])}
     return row | error_columns(calibration["methods"]["adjustment"], truth)
+
+
+def _left_out(calibration: dict[str, Any], found: dict[str, Any], drawn: dict[str, Any]) -> dict[str, str]:
+    """Return columns with the drawn names of faces whose soundings are left out, at all heights and at some."""
+    rows, columns = calibration.get("left_out", []), {}
+    for name, whole in (("left_out", True), ("stripes", False)):
+        families = [row["family"] for row in rows if (row["low_m"] is None and row["high_m"] is None) == whole]
+        columns[name] = " ".join(drawn_names(families, found, drawn))
+    return columns
 
 
 def _by_drawing(session: Path, by_finding: dict[str, Any]) -> dict[str, float]:
@@ -175,6 +196,52 @@ def _line(place: str, rows: pd.DataFrame) -> str:
     return f"| {' | '.join(cells)} |"
 
 
+ROUGH_HEAD = """# Walls as they are
+
+Made by `python -m tools.place_campaign --rough --only {places}`, {sessions} sessions of each place, as in
+[places](places.md), and beside it by seed: growth on the wet faces of up to 3 cm that varies by up to 1.5 cm, faces
+uneven by up to 3 mm, splash; two fenders and a ladder at the largest wall, a footing of 15 to 50 cm along it in every
+second session, a moored boat before it in three of ten. In every second session one wet face stands off by 8 to 30 cm,
+or is turned by 0.6 to 2°, which nobody knows.
+
+"""
+
+
+def summary_of_rough(table: pd.DataFrame) -> str:
+    """Return the page of the walls as they are in Markdown."""
+    heads = (
+        "place", "accepted", "worst error ÷ σ of accepted", "largest NSE of accepted", "rejected for sigmas alone",
+        "mean NSE of both", "otherwise rejected", "for", "false faces left out", "other faces left out",
+    )  # fmt: skip
+    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
+    groups = [(str(place), rows.reset_index(drop=True)) for place, rows in table.groupby("place", sort=False)]
+    lines += [_line_of_rough(place, rows) for place, rows in groups]
+    sessions = int(table.groupby("place").size().max())
+    return ROUGH_HEAD.format(sessions=sessions, places=" ".join(place for place, _ in groups)) + "\n".join(lines) + "\n"
+
+
+def _line_of_rough(place: str, rows: pd.DataFrame) -> str:
+    codes, accepted = rows["codes"].fillna("no_result"), rows["verdict"] == "accepted"
+    weak = ~accepted & codes.map(lambda words: set(words.split()) <= WEAK_ALONE)
+    others = rows[~(accepted | weak)]
+    errors, totals = (
+        rows.loc[accepted, [f"{kind}_{name}" for name in NAMES]].to_numpy(float) for kind in ("error", "total")
+    )
+    worst = np.abs(errors / totals).max(initial=0.0)
+    reasons = ", ".join(sorted({word for words in codes[others.index] for word in words.split()} - WEAK_ALONE))
+    left_out = [set(str(names).split()) for names in rows["left_out"].fillna("")]
+    false = [fault for fault in rows["fault"] if fault]
+    pairs = list(zip(rows["fault"], left_out, strict=True))
+    found = sum(fault in names for fault, names in pairs if fault)
+    more = sum(len({name for name in names if not name.startswith("?")} - {fault}) for fault, names in pairs)
+    cells = (
+        place, f"{int(accepted.sum())} of {len(rows)}", f"{worst:.1f}", f"{rows.loc[accepted, 'nse_total'].max():.0f}",
+        str(int(weak.sum())), f"{rows.loc[accepted | weak, 'nse_total'].mean():.1f}", str(len(others)), reasons,
+        f"{found} of {len(false)}", str(more),
+    )  # fmt: skip
+    return f"| {' | '.join(cells)} |"
+
+
 def _differences(table: pd.DataFrame) -> str:
     """Return a line for each place: how far the values on the found and on the drawn target differ, RMS in sigmas."""
     lines = ["Values on the found target less those on the drawn one, RMS in total sigmas:", ""]
@@ -188,19 +255,23 @@ def _differences(table: pd.DataFrame) -> str:
 def main() -> None:
     """Run the campaign and print its table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--only", nargs="+", default=list(PLACES), choices=list(PLACES), help="places; default: all")
+    parser.add_argument("--only", nargs="+", choices=list(PLACES), help="default: all, or those fit for --rough")
     parser.add_argument("--sessions", type=int, default=60, help="of each place; default: 60")
     parser.add_argument("--jobs", type=int, default=2, help="sessions at a time; default: 2")
     parser.add_argument("--drawn", action="store_true", help="calibrate on the drawn target, too, and compare")
+    parser.add_argument("--rough", action="store_true", help="walls as they are, with a false wet face in every second")
     parser.add_argument("--resume", action="store_true", help="keep the rows of an interrupted campaign")
     given = parser.parse_args()
     tables = []
-    for place in given.only:
+    for place in given.only or (ROUGH_PLACES if given.rough else PLACES):
         first = FIRST_SEED + 1000 * list(PLACES).index(place)
-        tasks = [Task(place, first + k, planned=k == 0, drawn=given.drawn) for k in range(given.sessions)]
-        path = FOLDER / f"{place}.parquet"
+        tasks = [
+            Task(place, first + k, planned=k == 0 and not given.rough, drawn=given.drawn, rough=given.rough)
+            for k in range(given.sessions)
+        ]
+        path = FOLDER / f"{'rough-' * given.rough}{place}.parquet"
         tables.append(collect_rows(path, row_of, tasks, given.jobs, given.resume, TASKS_OF_A_WORKER))
-    print(summary(pd.concat(tables)), end="")
+    print((summary_of_rough if given.rough else summary)(pd.concat(tables)), end="")
     if given.drawn:
         print(_differences(pd.concat(tables)))
 

@@ -67,6 +67,14 @@ PLACES: dict[str, dict[str, Any]] = {
         "track": {"distances_m": [4.0, 8.0, 5.0, 7.0], "half_length_m": 6.0},
     },
     "piling": {"faces": _piling()},
+    "slip": {
+        "faces": {
+            "wall": wall((0, -2), (0, 4)), "south": wall((2, -4), (0, -2)), "north": wall((0, 4), (2, 6)),
+            "slope": [[-4, -4, -4], [-4, -9, -4], [2, -9, 2], [2, -4, 2]],
+            "ramp": [[-4, 11, -4], [-4, 6, -4], [2, 6, 2], [2, 11, 2]],
+        },
+        "track": {"distances_m": [7.0, 9.0, 7.5, 8.5], "half_length_m": 9.0},
+    },
 }
 
 
