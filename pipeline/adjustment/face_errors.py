@@ -1,6 +1,6 @@
 """The solution with the shifts of single faces: their errors for the total covariance, and a test of each."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -43,19 +43,21 @@ def with_shared_noise(
     Parameters: as for :func:`final_solution`.
     """
     sums = dict(sums_by_face)
-    if adjustment.ping is not None:
+    of_face = problem.model.faces.surface
+    for head, ping in adjustment.pings.items():
         with_pings = partial(
             with_ping_noise,
-            noise=adjustment.ping,
+            noise=ping,
             surfaces=adjustment.last.linearisation.state.surfaces,
             white=problem.prior.noise.white,
         )
-        of_face = problem.model.faces.surface
 
-        def changed(block: IntervalSums, _: Integers) -> IntervalSums:
+        def changed(
+            block: IntervalSums, _: Integers, with_pings: Callable[[IntervalSums], IntervalSums] = with_pings
+        ) -> IntervalSums:
             return replace(with_pings(replace(block, surface=of_face[block.surface])), surface=block.surface)
 
-        sums["mbes"] = sums["mbes"].changed(changed)
+        sums[head] = sums[head].changed(changed)
     return sums
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.adjustment.accumulation import Accumulation, accumulate, reweighted
-from pipeline.adjustment.initial_mount import initial_mount
+from pipeline.adjustment.initial_mount import initial_mounts
 from pipeline.adjustment.iterate import Iterate
 from pipeline.adjustment.observation_model import CurrentValues
 from pipeline.adjustment.problem import CalibrationProblem
@@ -17,7 +17,7 @@ from pipeline.artefacts.streams import Stream
 from pipeline.maths.adjustment.drift_likelihood import DriftFigures
 from pipeline.maths.adjustment.eliminate_drift import NormalEquations
 from pipeline.maths.adjustment.normal_equations import Linearisation
-from pipeline.maths.adjustment.parameters import State
+from pipeline.maths.adjustment.parameters import State, kind_of
 from pipeline.maths.adjustment.ping_noise import PingNoise, ping_noise, with_ping_noise
 from pipeline.maths.adjustment.pose_errors import DriftEstimate
 from pipeline.maths.adjustment.solution import Solution, solve
@@ -79,9 +79,9 @@ class MountAdjustment:
 
     accumulation: sums at the final values; epoch_factors: by sensor, the variance factor of the error common to all
     points of an interval (empty without a solution; the laser's factor, if it is well known, is already in the INS's
-    white noise of the solution); ping: noise that the soundings of a ping share, as the sums have it (None without a
-    sonar or a solution); drift_figures: the figures of the drift, which the solution has; equations: normal equations
-    of all parameters, also of the fixed ones; last: the values of the final solution.
+    white noise of the solution); pings: by head of the sonar, noise that the soundings of a ping share, as the sums
+    have it (empty without a sonar or a solution); drift_figures: the figures of the drift, which the solution has;
+    equations: normal equations of all parameters, also of the fixed ones; last: the values of the final solution.
     """
 
     state: State
@@ -89,7 +89,7 @@ class MountAdjustment:
     weighting: Weighting
     accumulation: Accumulation
     epoch_factors: Mapping[str, EpochVarianceFactor]
-    ping: PingNoise | None
+    pings: Mapping[str, PingNoise]
     drift_figures: DriftFigures
     equations: NormalEquations
     solution: Solution
@@ -131,9 +131,9 @@ class MountAdjustment:
 
 
 def estimated_columns(state: State, additional: Sequence[str] = (), mount: bool = True) -> list[int]:
-    """Return the numbers of the parameters to estimate: mount, surfaces, and the ones named in ``additional``."""
+    """Return the numbers of the parameters to estimate: mounts, surfaces, and the ones named in ``additional``."""
     surfaces = range(state.surface_slice.start, state.surface_slice.stop)
-    return sorted({*range(N_MOUNT if mount else 0), *surfaces, *(state.names.index(name) for name in additional)})
+    return sorted({*(state.mounts if mount else ()), *surfaces, *(state.names.index(name) for name in additional)})
 
 
 def adjust_mount(
@@ -153,29 +153,24 @@ def adjust_mount(
         A longer time (s) without observations interrupts the knots of the drift.
     """
     prior = problem.prior
-    figures, ping = DriftFigures.of_session(prior.noise), None
+    figures, pings = DriftFigures.of_session(prior.noise), dict[str, PingNoise]()
     weighted = weighted_iteration(problem, streams, settings, gap_s)
     # parameters that the points tell of, and that are known beforehand, are estimated with the last weights
     last, estimated = weighted.last, np.union1d(weighted.estimated, prior.known_parameters)
+    mounts = np.flatnonzero(np.isin(estimated, last.linearisation.state.mounts))
     factors: dict[str, EpochVarianceFactor] = {}
     converged = False
     if not weighted.deficient:
         # take the INS's noise from the data: white noise, then drift; further steps have the last weights
         factors["laser"] = last.record_noise(prior.noise)
-        if "mbes" in streams:  # a part of the sonar's noise is common to a ping
-            soundings, surfaces = last.linearisation.sums["mbes"], last.linearisation.state.surfaces
-            ping = ping_noise(soundings, surfaces, prior.noise.white, factors["laser"])
-            with_pings = soundings.stored(
-                partial(with_ping_noise, noise=ping, surfaces=surfaces, white=prior.noise.white)
-            )
-            last = replace(last, linearisation=last.linearisation.with_sums("mbes", with_pings))
-            factors["mbes"] = ping.epoch
+        last, pings = _with_ping_noise(last, prior.noise.white, factors["laser"])
+        factors |= {head: ping.epoch for head, ping in pings.items()}
         noise = noise_seen_by_laser(prior.noise, factors["laser"])
         reduced = last.reduced(noise.white, estimated)
         figures = last.drift_figures(noise, prior.drift, estimated, reduced)
         for closing in range(CLOSING_STEPS):
             last, solution = last.stepped(figures.noise, estimated, None if closing else reduced)
-            converged = weighted.settled and _is_small(solution, CONVERGED)
+            converged = weighted.settled and _is_small(solution, CONVERGED, mounts)
             if converged:
                 break
     # solve with the equations of all parameters: total covariance and tests need the fixed parameters
@@ -187,7 +182,7 @@ def adjust_mount(
         weighting=weighted.weighting,
         accumulation=replace(weighted.accumulation, sums=last.linearisation.sums),
         epoch_factors=factors,
-        ping=ping,
+        pings=pings,
         drift_figures=figures,
         equations=equations,
         solution=solution,
@@ -195,6 +190,28 @@ def adjust_mount(
         iterations=weighted.iterations,
         last=last,
     )
+
+
+def _with_ping_noise(last: Iterate, white: Array, laser: EpochVarianceFactor) -> tuple[Iterate, dict[str, PingNoise]]:
+    """Return the values with the noise that the soundings of a ping share in their sums; and this noise by head.
+
+    Parameters
+    ----------
+    last : Iterate
+        The values.
+    white : (6,) array
+        Standard deviations of a record's white noise, m and rad.
+    laser : EpochVarianceFactor
+        Variance factor of this noise, from the laser's points.
+    """
+    pings = {}
+    for head, soundings in last.linearisation.sums.items():
+        if kind_of(head) == "mbes":
+            surfaces = last.linearisation.state.surfaces
+            pings[head] = ping_noise(soundings, surfaces, white, laser)
+            with_pings = soundings.stored(partial(with_ping_noise, noise=pings[head], surfaces=surfaces, white=white))
+            last = replace(last, linearisation=last.linearisation.with_sums(head, with_pings))
+    return last, pings
 
 
 @dataclass(frozen=True)
@@ -219,10 +236,11 @@ def weighted_iteration(
     :func:`adjust_mount`.
     """
     model, prior = problem.model, problem.prior
-    state = initial_mount(streams["mbes"], model) if "mbes" in streams else model.coarse
+    state = initial_mounts(streams, model)
     values = CurrentValues(state, weighting=Weighting(white=prior.noise.white))
     estimated = np.array(estimated_columns(state, settings.free, mount=state.calibrated in streams))
     estimated = np.union1d(estimated, prior.known_parameters) if prior.from_start else estimated
+    mounts = np.flatnonzero(np.isin(estimated, state.mounts))
     iteration = 0
     while True:
         iteration += 1
@@ -234,7 +252,7 @@ def weighted_iteration(
         # solve and step
         stepped, solution = start.stepped(replace(prior.noise, white=weighting.white), estimated)
         deficient = solution.deficiency > 0
-        settled = weighting.robust is not None and _is_small(solution, SETTLED)
+        settled = weighting.robust is not None and _is_small(solution, SETTLED, mounts)
         if deficient or (settled and iteration >= LEAST_PASSES) or iteration >= settings.max_iterations:
             return WeightedIteration(
                 last=start if deficient else stepped,
@@ -254,13 +272,19 @@ def weighted_iteration(
         del accumulation, linearisation, start, stepped  # the next reading needs their memory
 
 
-def _is_small(solution: Solution, limits: StepLimits) -> bool:
-    """Return whether the step of each estimated mount parameter is within the limits; without these, of each surface's.
+def _is_small(solution: Solution, limits: StepLimits, mounts: Integers) -> bool:
+    """Return whether the step of each estimated mount parameter is within the limits.
 
-    The turns and shifts of surfaces, rad and m, have the limit of rotations.
+    Parameters
+    ----------
+    solution : Solution
+        Solution of the estimated parameters alone.
+    limits : StepLimits
+        Bounds of the steps.
+    mounts : (6 h,) array
+        Places of the h mounts among its parameters. Without any the first six count, which are those of surfaces.
     """
-    estimated = solution.estimated
-    judged = estimated < N_MOUNT if np.any(estimated < N_MOUNT) else np.ones(len(estimated), dtype=bool)
+    judged = mounts if len(mounts) else np.arange(min(N_MOUNT, len(solution.estimated)))
     sigma = np.sqrt(np.diag(solution.covariance))[judged]
-    absolute = np.where((estimated >= 3) & (estimated < N_MOUNT), limits.m, limits.rad)[judged]
-    return bool(np.all(np.abs(solution.step[estimated][judged]) <= np.maximum(limits.sigmas * sigma, absolute)))
+    absolute = np.where(np.arange(len(judged)) % N_MOUNT < 3, limits.rad, limits.m)
+    return bool(np.all(np.abs(solution.step[judged]) <= np.maximum(limits.sigmas * sigma, absolute)))

@@ -20,7 +20,7 @@ from pipeline.maths.adjustment.normal_equations import reduced_by_group
 from pipeline.maths.adjustment.parts import Deviation, deviation
 from pipeline.maths.adjustment.solution import solve
 from pipeline.maths.geometry.passes import pass_of
-from pipeline.maths.mount_parameters import N_MOUNT, PARAMETERS
+from pipeline.maths.mount_parameters import PARAMETERS
 
 Integers = NDArray[np.int64]
 APART_M = 0.5  # near and far passes differ by at least this distance
@@ -65,14 +65,14 @@ def parts_table(problem: CalibrationProblem, adjustment: MountAdjustment, passes
     passes : DataFrame
         Table passes.
     """
-    rows = [_row(part, difference) for part, difference in _deviations(problem, adjustment, passes)]
+    rows = [_row(name, part, difference) for name, part, difference in _deviations(problem, adjustment, passes)]
     return pd.DataFrame(rows, columns=[column.name for column in PARTS.columns])
 
 
 def _deviations(
     problem: CalibrationProblem, adjustment: MountAdjustment, passes: pd.DataFrame
-) -> Iterator[tuple[Part, Deviation]]:
-    """Yield the deviation of each part that determines all parameters."""
+) -> Iterator[tuple[str, Part, Deviation]]:
+    """Yield the deviations of each part that determines all parameters: of each head's mount, with a name."""
     whole = adjustment.solution
     if whole.deficiency:
         return
@@ -91,7 +91,10 @@ def _deviations(
         equations = last.equations(noise, reduced=reduced.of(groups))
         solution = solve(equations.normal, equations.right, whole.estimated.tolist())
         if not solution.deficiency:
-            yield part, deviation(solution, whole, problem.consider, np.arange(N_MOUNT))
+            state = adjustment.state
+            for head in state.heads:
+                name = part.name if head == state.calibrated else f"{part.name} ({head})"
+                yield name, part, deviation(solution, whole, problem.consider, state.mount_columns(head))
 
 
 def _passes_of(record: Integers, pass_of_record: Integers) -> Integers:
@@ -100,11 +103,11 @@ def _passes_of(record: Integers, pass_of_record: Integers) -> Integers:
     return np.where(before >= 0, before, after)
 
 
-def _row(part: Part, difference: Deviation) -> dict[str, Any]:
-    row: dict[str, Any] = {"part": part.name, "passes": " ".join(map(str, part.passes))}
+def _row(name: str, part: Part, difference: Deviation) -> dict[str, Any]:
+    row: dict[str, Any] = {"part": name, "passes": " ".join(map(str, part.passes))}
     row |= {"normalised": difference.normalised, "dof": difference.dof}
-    for name, number, _, unit in PARAMETERS:
+    for parameter, number, _, unit in PARAMETERS:
         scale = float(np.degrees(1.0)) if unit == "deg" else 1.0
         for kind, values in (("change", difference.change), ("sigma", difference.sigma)):
-            row[f"{kind}_{name}"] = scale * float(values[number])
+            row[f"{kind}_{parameter}"] = scale * float(values[number])
     return row

@@ -19,7 +19,8 @@ from pipeline.maths.adjustment.body_motion import BodyMotion
 from pipeline.maths.adjustment.design_matrix import SensorSigmas
 from pipeline.maths.adjustment.drift_likelihood import EXACT, DriftPrior
 from pipeline.maths.adjustment.face_shifts import Faces
-from pipeline.maths.adjustment.parameters import ObservedSurface, State
+from pipeline.maths.adjustment.observed_surface import ObservedSurface
+from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.pose_errors import PoseNoise
 from pipeline.maths.adjustment.pseudo_observations import ParallelPrior, ParameterPrior, Prior
 from pipeline.maths.adjustment.solution import ConsiderErrors

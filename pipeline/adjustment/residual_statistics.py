@@ -23,7 +23,7 @@ from pipeline.gps_time import NS
 from pipeline.maths.adjustment.design_matrix import FLATTEST
 from pipeline.maths.adjustment.interval_sums import Intervals, IntervalSums
 from pipeline.maths.adjustment.mean_tests import normal_deviates
-from pipeline.maths.adjustment.parameters import State
+from pipeline.maths.adjustment.parameters import State, kind_of
 from pipeline.maths.adjustment.pose_errors import drift_between_passes
 from pipeline.maths.adjustment.residual_means import (
     BinMean,
@@ -113,7 +113,7 @@ def residual_statistics(
         pieces: dict[str, list[ResidualSums]] = {}
         read = stream.fold(_batch, problem.model, sensor, adjustment.values, thinning)
         by_face = _kept(read, pieces, samples)
-        sums_by_face[sensor] = StoredSums.of(by_face, N_FEATURES[sensor])
+        sums_by_face[sensor] = StoredSums.of(by_face, N_FEATURES[kind_of(sensor)])
         give_back_memory()
         for variable, parts in pieces.items():
             sums = merged_residual_sums(parts)
@@ -185,7 +185,7 @@ def _variables(
     itself, because faces end at different heights. On a level face the height is that of the drift; it has no test.
     """
     batch, v_m, cosine = observed.points, observed.observed[0], observed.observed[-1]
-    own = point_array(batch, f"{sensor}_m")
+    own = point_array(batch, f"{kind_of(sensor)}_m")
     range_m = np.sqrt(own[:, 0] ** 2 + own[:, 1] ** 2 + own[:, 2] ** 2)
     reached_m = range_m - v_m / np.copysign(np.maximum(np.abs(cosine), FLATTEST), cosine)
     angle = np.degrees(np.arcsin(own[:, 2] / range_m) if sensor == "laser" else receive_angle(own))
@@ -195,7 +195,7 @@ def _variables(
     yield "distance", reached_m
     yield "height", _heights(model, sensor, observed, state, reached_m / range_m)
     yield "time", batch["t_ns"] // NS
-    if sensor == "mbes":
+    if kind_of(sensor) == "mbes":
         yield "step", angle
         for name, pings in CYCLES.items():
             yield name, batch["ping"] % pings
@@ -207,7 +207,8 @@ def _heights(model: ObservationModel, sensor: str, observed: SummedBatch, state:
     The sensor's height between two records is linear in time here: to a millimetre, where a bin is a decimetre.
     """
     points, body, record = observed.points, model.body, observed.record
-    measured = model.points_in_target(points, state)[:, 2] if sensor == state.calibrated else points["z_target_m"]
+    is_calibrated = sensor in state.heads
+    measured = model.points_in_target(sensor, points, state)[:, 2] if is_calibrated else points["z_target_m"]
     lever_arm = body.lever_arm(sensor, state)
     used = slice(int(record.min(initial=0)), int(record.max(initial=0)) + 2)
     at_records = body.trajectory.positions_m[used, 2] + body.trajectory.R_frame_from_body[used, 2] @ lever_arm

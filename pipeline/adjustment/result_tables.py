@@ -19,12 +19,14 @@ from pipeline.artefacts.catalogue.results import CELLS, SETS
 from pipeline.artefacts.to_tables import normal_columns
 from pipeline.console import plural
 from pipeline.maths.adjustment.parameter_tests import ParameterTest
+from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.solution import Solution, weakest_direction
 from pipeline.maths.adjustment.weighting import scatter
 from pipeline.maths.geometry.passes import pass_of
 from pipeline.maths.mount_parameters import MOUNT_NAMES, N_MOUNT
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 
 def result_tables(
@@ -56,7 +58,7 @@ def result_tables(
     by_session = strengths_by_session(problem, adjustment, statistics.sums_by_face, final)
     return {
         "estimate": estimate.join(sigma_check(adjustment), on="unknown"),
-        "covariance": _covariance_table(random[:N_MOUNT, :N_MOUNT], total[:N_MOUNT, :N_MOUNT]),
+        "covariance": _covariance_table(final, adjustment.state.mounts, random, total),
         "freed": _single_parameter_table(problem, final, estimate, tests, by_session),
         "sets": _set_table(set_tests(final, tests), by_session),
         "groups": groups_table(adjustment),
@@ -71,7 +73,7 @@ def result_tables(
 def _estimate(problem: CalibrationProblem, final: FinalSolution) -> tuple[pd.DataFrame, Array, Array]:
     """Return the table of mount and estimated parameters, and their random and total covariance.
 
-    If the data leave a direction open, the mount's values and both covariances are NaN.
+    If the data leave a direction open, the mounts' values and both covariances are NaN.
     """
     solution = final.solution
     numbers = solution.estimated
@@ -79,7 +81,8 @@ def _estimate(problem: CalibrationProblem, final: FinalSolution) -> tuple[pd.Dat
     total = solution.total_covariance(problem.consider, numbers)
     values = final.deviation[numbers]
     if solution.deficiency:
-        values[:N_MOUNT], random, total = np.nan, np.full_like(random, np.nan), np.full_like(total, np.nan)
+        values[np.isin(numbers, problem.model.coarse.mounts)] = np.nan
+        random, total = np.full_like(random, np.nan), np.full_like(total, np.nan)
     table = pd.DataFrame(
         {
             "unknown": [final.names[k] for k in numbers],
@@ -103,7 +106,7 @@ def _summary_table(adjustment: MountAdjustment, test: Mapping[str, Any]) -> pd.D
         "between_dof": between.dof,
         "condition": solution.condition,
         "rank_deficiency": solution.deficiency,
-        "weakest": "" if solution.deficiency else weakest_direction(solution.covariance[:N_MOUNT, :N_MOUNT]),
+        "weakest": "" if solution.deficiency else _weakest(adjustment.state, solution),
         **{f"test_{name}": test[name] for name in ("statistic", "dof", "limit", "passed")},
         "reason": _no_result(solution.deficiency) if solution.deficiency else "",
     }
@@ -114,15 +117,28 @@ def _no_result(deficiency: int) -> str:
     return f"the data leave {plural(deficiency, 'direction')} of the unknowns open"
 
 
-def _covariance_table(random: Array, total: Array) -> pd.DataFrame:
+def _weakest(state: State, solution: Solution) -> str:
+    """Return in words which mount parameters are hardest to tell apart; with several heads, of each head."""
+    words = []
+    for head in state.heads:
+        places = np.searchsorted(solution.estimated, state.mount_columns(head))
+        of_head = weakest_direction(solution.covariance[np.ix_(places, places)])
+        words.append(of_head if head == state.calibrated else f"{head}: {of_head}")
+    return "; ".join(words)
+
+
+def _covariance_table(final: FinalSolution, mounts: Integers, random: Array, total: Array) -> pd.DataFrame:
+    """Return the table of the covariance of all mounts, from the covariances of the estimated parameters."""
+    places, names = np.searchsorted(final.solution.estimated, mounts), [final.names[k] for k in mounts]
+    random, total = random[np.ix_(places, places)], total[np.ix_(places, places)]
     sigma = np.sqrt(np.diag(random))
     product = np.outer(sigma, sigma)
-    unknown = np.where(np.isnan(product), np.nan, np.eye(N_MOUNT))
+    unknown = np.where(np.isnan(product), np.nan, np.eye(len(mounts)))
     correlation = np.divide(random, product, out=unknown, where=product > 0)
     return pd.DataFrame(
         {
-            "row": np.repeat(MOUNT_NAMES, N_MOUNT),
-            "column": np.tile(MOUNT_NAMES, N_MOUNT),
+            "row": np.repeat(names, len(names)),
+            "column": np.tile(names, len(names)),
             "covariance": random.ravel(),
             "correlation": correlation.ravel(),
             "covariance_total": total.ravel(),
@@ -150,8 +166,9 @@ def _single_parameter_table(
     effects[:, solution.fixed] = solution.sensitivity_of(mount) * consider.sigmas[solution.fixed]
     effects[:, known] = solution.prior_effects(mount, known)
     by_name, rows = estimate.set_index("unknown"), []
-    surfaces = problem.model.coarse.surface_slice
-    freed = np.setdiff1d(solution.estimated, [*mount, *range(surfaces.start, surfaces.stop), *known]).tolist()
+    coarse, surfaces = problem.model.coarse, problem.model.coarse.surface_slice
+    of_state = [*coarse.mounts, *range(surfaces.start, surfaces.stop)]
+    freed = np.setdiff1d(solution.estimated, [*of_state, *known]).tolist()
     for number in [*sorted([*solution.fixed.tolist(), *known.tolist()]), *freed]:
         name, considered = final.names[number], consider.sigmas[number]
         test = by_number.get(number, ParameterTest(number, np.nan, np.nan, np.nan, np.nan))
@@ -203,8 +220,8 @@ def _surfaces_table(adjustment: MountAdjustment, statistics: ResidualStatistics)
     for k, surface in enumerate(adjustment.state.surfaces):
         row = normal_columns(surface.normal)
         row |= {"family": surface.family, "distance_m": surface.distance_m}
-        for sensor, column in (("laser", "laser_points"), ("mbes", "soundings")):
-            row[column] = statistics.count(sensor, k)
+        row["laser_points"] = statistics.count("laser", k)
+        row["soundings"] = sum(statistics.count(head, k) for head in ("mbes", *adjustment.state.heads[1:]))
         rows.append(row)
     return pd.DataFrame(rows)
 

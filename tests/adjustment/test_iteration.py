@@ -63,8 +63,7 @@ def test_drift_taken_for_granted_would_be_seen() -> None:
     trusting = adjust_mount(problem(model, QUIET), streams, Adjust(), 5.0)
     e = error_of(trusting)
     assert e @ np.linalg.solve(trusting.solution.covariance[:6, :6], e) > chi2.isf(1e-12, 6)
-    assert trusting.ping is not None
-    assert np.all(trusting.ping.effects.of_mean > 1.5)
+    assert np.all(trusting.pings["mbes"].effects.of_mean > 1.5)
     assert trusting.equations.squares / trusting.redundancy > 1.2
 
 
