@@ -13,6 +13,7 @@ from pipeline.atomic_files import write_text
 from pipeline.config.about import About
 from pipeline.config.fill_in import refuse_unfilled
 from pipeline.config.found import Found
+from pipeline.config.heads import heads_apart
 from pipeline.config.load import pool_in, session_in, session_yaml, stated_keys
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import Calibrated, Mbes, SessionConfig
@@ -113,7 +114,10 @@ def load_settings(
     if session.mbes is not None:
         refuse_shallow_cast(pool.target, session.mbes, session_folder / SESSION_YAML)
     digests = {name: file.sha256 for name, file in files.items()}
-    stated = {name: stated_keys(file.content) for name, file in files.items()}
+    stated = {
+        "session": stated_keys(heads_apart(files["session"].content, SESSION_YAML)),
+        "config": stated_keys(config.content),
+    }
     return Settings(session_folder.resolve(), pool, session, digests, stated)
 
 
