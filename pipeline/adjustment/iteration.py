@@ -17,7 +17,7 @@ from pipeline.artefacts.streams import Stream
 from pipeline.maths.adjustment.drift_likelihood import DriftFigures
 from pipeline.maths.adjustment.eliminate_drift import NormalEquations
 from pipeline.maths.adjustment.normal_equations import Linearisation
-from pipeline.maths.adjustment.parameters import State, kind_of
+from pipeline.maths.adjustment.parameters import State, kind_of, of_head
 from pipeline.maths.adjustment.ping_noise import PingNoise, ping_noise, with_ping_noise
 from pipeline.maths.adjustment.pose_errors import DriftEstimate
 from pipeline.maths.adjustment.solution import Solution, solve
@@ -131,9 +131,13 @@ class MountAdjustment:
 
 
 def estimated_columns(state: State, additional: Sequence[str] = (), mount: bool = True) -> list[int]:
-    """Return the numbers of the parameters to estimate: mounts, surfaces, and the ones named in ``additional``."""
+    """Return the numbers of the parameters to estimate: mounts, surfaces, and the ones named in ``additional``.
+
+    A parameter of the first head names those of all heads.
+    """
     surfaces = range(state.surface_slice.start, state.surface_slice.stop)
-    return sorted({*(state.mounts if mount else ()), *surfaces, *(state.names.index(name) for name in additional)})
+    further = (number for number, name in enumerate(state.names) if of_head(name)[1] in additional)
+    return sorted({*(state.mounts if mount else ()), *surfaces, *further})
 
 
 def adjust_mount(

@@ -21,6 +21,7 @@ The mount parameters and the surfaces are estimated. The others are fixed at zer
 them. All fixed parameters are *consider* parameters: their sigmas enter the total covariance.
 """
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -69,6 +70,19 @@ def names_of_head(head: str) -> tuple[str, ...]:
     ('mbes_2_lever_arm_z', 'mbes_2_latency', 'mbes_2_range')
     """
     return tuple(f"{head}_{name.removeprefix('mbes_')}" for name in OF_ONE_HEAD)
+
+
+def of_head(name: str) -> tuple[str, str]:
+    """Return the further head to which a parameter belongs, empty if to none, and its name if it were the first's.
+
+    >>> of_head("mbes_2_range"), of_head("mbes_2_projector_x"), of_head("mbes_range")
+    (('mbes_2', 'mbes_range'), ('mbes_2', 'projector_x'), ('', 'mbes_range'))
+    """
+    found = re.fullmatch(r"(mbes_[0-9]+)_(.+)", name)
+    if found is None:
+        return "", name
+    head, own = found.groups()
+    return head, own if own in MBES_PARAMETERS else f"mbes_{own}"
 
 
 @dataclass(frozen=True)
