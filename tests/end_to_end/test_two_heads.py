@@ -12,7 +12,7 @@ import yaml
 
 from pipeline.config.yaml_file import read_yaml
 from tests.support.mount_errors import rotation_error
-from tests.support.places import digests, poolcal, result_of
+from tests.support.places import digests, poolcal, poolcal_process, result_of
 
 FIRST = {"roll_deg": -48.8, "pitch_deg": 1.2, "yaw_deg": -2.0, "x_m": 0.30, "y_m": 0.20, "z_m": -2.01}
 SECOND = {"roll_deg": -38.0, "pitch_deg": -0.9, "yaw_deg": 1.6, "x_m": -0.30, "y_m": -0.25, "z_m": -2.05}
@@ -197,3 +197,13 @@ def test_what_takes_one_head_says_so_in_a_line(
 def test_history_says_what_it_leaves_out(run: Path) -> None:
     told = poolcal("history", run.parent)
     assert "with 2 heads" in told.err + told.out
+
+
+def test_repeat_leaves_the_session_alone_and_says_why(session: Path, tmp_path: Path) -> None:
+    listed = {"session": str(session), "config": str(session / "pool.yaml"), "run": str(tmp_path / "run")}
+    fleet = {"sessions": [listed]}
+    (tmp_path / "fleet.yaml").write_text(yaml.safe_dump(fleet), encoding="utf-8")
+    told = poolcal_process("repeat", tmp_path / "fleet.yaml")
+    assert told.status == 2
+    assert "mbes: lists 2 heads" in told.err + told.out
+    assert not (tmp_path / "run").exists()
