@@ -29,7 +29,7 @@ from pipeline.report.calibration_document import (
 )
 from pipeline.report.drift_check import NO_DRIFT, check_ins_drift, figures_disagree
 from pipeline.report.evidence import Evidence
-from pipeline.report.heads import FIRST, HeadReport, OfHeads, evidence_of, head_report, heads_keys
+from pipeline.report.heads import FIRST, HeadReport, OfHeads, evidence_of, head_report, heads_keys, outside_passes
 from pipeline.report.hypotheses import hypotheses_block
 from pipeline.report.label_checks import unsettled_labels
 from pipeline.report.laser_report import laser_report
@@ -120,6 +120,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         *report.pass_warnings,
         *deviations_from_design(shape, design_shape(model), shape_errors(inputs.planes, model)),
         *report.cast_warnings,
+        *outside_passes(inputs.cells, inputs.counts_of_heads),
         *(one for head in further for one in head.warnings(config.adjust.test_level)),
     ]
     verdict = "rejected" if reasons else "accepted"

@@ -14,7 +14,8 @@ import pandas as pd
 
 from pipeline.artefacts.catalogue.patent import CORRECTIONS
 from pipeline.artefacts.catalogue.points import FILES, UNSOUNDED_PASSES
-from pipeline.artefacts.catalogue.target import PLANES, PROVISIONAL_MOUNT, SOUNDING_MOMENTS, TARGET_POSE
+from pipeline.artefacts.catalogue.target import PLANES, PROVISIONAL_MOUNT, SEGMENT_COUNTS, SOUNDING_MOMENTS, TARGET_POSE
+from pipeline.artefacts.counts import used
 from pipeline.artefacts.schema import OfFurtherHeads
 from pipeline.maths.adjustment.parameters import of_head
 from pipeline.maths.mount_parameters import MOUNT_NAMES, N_MOUNT
@@ -23,12 +24,13 @@ from pipeline.report.evidence import Evidence
 from pipeline.report.label_checks import unsettled_labels
 from pipeline.report.method_blocks import calibration_table
 from pipeline.report.noise_warnings import sigmas_too_small
-from pipeline.report.reason_codes import Statement
+from pipeline.report.reason_codes import ReasonCode, Statement, named
 from pipeline.report.sensor_report import SensorReport
-from pipeline.report.verdict import Criteria, JudgedHead, named, own_reasons
+from pipeline.report.verdict import Criteria, JudgedHead, own_reasons
 
 Tables = Mapping[str, pd.DataFrame]  # by head
 FIRST = "mbes"
+MOST_OUTSIDE = 0.01  # share of a head's labelled soundings outside the passes: pings before and after them
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,6 +44,7 @@ class OfHeads:
     further_target_pose: Annotated[Tables, OfFurtherHeads(TARGET_POSE)]
     further_provisional_mount: Annotated[Tables, OfFurtherHeads(PROVISIONAL_MOUNT)]
     further_corrections: Annotated[Tables, OfFurtherHeads(CORRECTIONS)]
+    counts_of_heads: Annotated[Tables, OfFurtherHeads(SEGMENT_COUNTS)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,7 +132,28 @@ def evidence_of(evidence: Evidence, of_heads: OfHeads, head: str) -> Evidence:
 
 
 def _own_tables(of_heads: OfHeads, head: str) -> dict[str, pd.DataFrame]:
-    return {one.name.removeprefix("further_"): getattr(of_heads, one.name)[head] for one in fields(OfHeads)}
+    names = [one.name for one in fields(OfHeads) if one.name.startswith("further_")]
+    return {name.removeprefix("further_"): getattr(of_heads, name)[head] for name in names}
+
+
+def outside_passes(cells: pd.DataFrame, counts_of_heads: Tables) -> list[Statement]:
+    """Return a warning for each further head of whose labelled soundings many lie outside the first head's passes.
+
+    Parameters
+    ----------
+    cells : the table, which has all labelled soundings in these passes
+    counts_of_heads : table ``counts`` of stage segment, by further head
+    """
+    warnings = []
+    for head, counts in counts_of_heads.items():
+        labelled, inside = int(used(counts, "soundings_pool")), int(cells.loc[cells["sensor"] == head, "count"].sum())
+        if labelled - inside > MOST_OUTSIDE * labelled:
+            words = (
+                f"{head}: {labelled - inside:,} of its {labelled:,} soundings on the target lie outside the passes of "
+                "the first head, and are not used"
+            )
+            warnings.append(Statement(ReasonCode.SOUNDINGS_OUTSIDE_PASSES, words))
+    return warnings
 
 
 def heads_keys(first: HeadReport, further: Sequence[HeadReport], covariance: pd.DataFrame) -> dict[str, Any]:

@@ -30,7 +30,7 @@ planning/observability.py.
 ``MAX_DRIFT_M`` and ``SAME_STEP_DEG`` of residual_words.py only change the words of a reason.
 """
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -46,7 +46,7 @@ from pipeline.report.hypotheses import Hypothesis, hypotheses
 from pipeline.report.label_checks import noise_cut_by_gate, too_few_soundings
 from pipeline.report.limit_checks import patent_reasons, sigmas_above_limit, soundings_above_limit
 from pipeline.report.part_checks import disagreeing_parts
-from pipeline.report.reason_codes import ReasonCode, Statement
+from pipeline.report.reason_codes import ReasonCode, Statement, named
 from pipeline.report.residual_tests import deviating_parts, deviations
 from pipeline.report.residual_words import ResidualTests
 from pipeline.report.sigma_sources import contributions
@@ -175,11 +175,6 @@ def _patent_reasons(head: JudgedHead) -> list[Statement]:
         return []
     row = corrections.set_index("method").loc[method]
     return list(patent_reasons(method, row, head.methods, head.criteria.limits))
-
-
-def named(head: str, statements: Iterable[Statement]) -> list[Statement]:
-    """Return statements with the name of the head that they are about; unchanged if the name is empty."""
-    return [Statement(one.code, f"{head}: {one.words}" if head else one.words) for one in statements]
 
 
 def _beyond_limits(head: JudgedHead, is_first: bool) -> list[Statement]:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -144,3 +145,19 @@ def test_a_head_that_sees_nothing_in_the_passes_of_the_first_is_refused(noisy_tw
     }
     with pytest.raises(RawDataError, match="mbes_2: none of its soundings on the target lies in a pass of the first"):
         calibrated(noisy_two, raw=raw)
+
+
+def test_soundings_outside_the_passes_of_the_first_head_are_counted(noisy_two: SimulatedSession) -> None:
+    """The first head records no second pass; what the second saw there is left out, and said."""
+    start, end = (noisy_two.truth["passes"][1][key] for key in ("start_ns", "end_ns"))
+    first = noisy_two.raw["mbes"]
+    kept = (first["t_ns"] < start - 5_000_000_000) | (first["t_ns"] > end + 5_000_000_000)
+    result = result_of(calibrated(noisy_two, raw={"mbes": {name: values[kept] for name, values in first.items()}}))
+    (warning,) = (
+        words
+        for words, code in zip(result["warnings"], result["warning_codes"], strict=True)
+        if code == "soundings_outside_passes"
+    )
+    left_out, of_all = (int(number.replace(",", "")) for number in re.findall(r"\b[0-9][0-9,]*", warning)[:2])
+    assert 0.1 < left_out / of_all < 0.3  # one pass of four, at 8 m
+    assert result["verdict"] == "accepted", result["reasons"]
