@@ -31,6 +31,7 @@ from pipeline.artefacts.catalogue.results import (
     FREED,
     GEOMETRY,
     GROUPS,
+    HEAD_EFFECTS,
     PARTS,
     PATTERNS,
     RESIDUAL_BINS,
@@ -105,6 +106,7 @@ class Outputs:
     residuals: Annotated[pd.DataFrame, RESIDUALS]
     residual_bins: Annotated[pd.DataFrame, RESIDUAL_BINS]
     residual_map: Annotated[pd.DataFrame, RESIDUAL_MAP]
+    head_effects: Annotated[pd.DataFrame | None, HEAD_EFFECTS] = None  # of a sonar with several heads
 
 
 def run(inputs: Inputs, config: Config) -> Outputs:

@@ -13,6 +13,8 @@ from pipeline.config.stage_settings import settings_by_name, stage_config
 from pipeline.run.stage_protocol import declared, inputs_in, name_of, of_each_head, run_in_memory
 from stages import load
 
+NO_PROVENANCE: dict[str, Any] = {"inputs": {}, "software": {}}
+
 
 def calibrate_in_memory(
     session: SessionConfig,
@@ -58,7 +60,7 @@ def calibrate_in_memory(
         if isinstance(marker, RawFiles):
             present = getattr(session, marker.sensor) is not None
             return Stream((MemoryPart(marker.sensor, raw[marker.sensor]),)) if present else EMPTY_STREAM
-        return artefacts[_key(marker)] if isinstance(marker, (Artefact, Document)) else {"inputs": {}, "software": {}}
+        return artefacts.get(_key(marker)) if isinstance(marker, (Artefact, Document)) else NO_PROVENANCE
 
     settings = settings_by_name(pool, session)
     names = [name_of(stage) for stage in stages]

@@ -106,6 +106,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     source = "the INS's files say" if drift_figures else "ins.drift says"
     drift_check, criteria = check_ins_drift(inputs.drift, drift, source), _criteria(config, report)
     off_figures = figures_disagree(inputs.drift_figures, source)
+    systematic = _systematic(inputs.freed, config.mbes, config)
     reasons = rejections(first, report.methods, criteria, drift_check, off_figures, [head.judged for head in further])
     warnings = [
         *geometry_gaps(inputs.geometry, report.methods["adjustment"]["sigma_mount_total"]),
@@ -135,7 +136,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         "limits": limits_document(config.limits),
         "result": report.method,
         **report.result_keys,
-        **heads_keys(head_report(FIRST, first, report, criteria), further, inputs.covariance),
+        **heads_keys(head_report(FIRST, first, report, criteria, systematic), further, inputs.covariance),
         "coarse": {"mount": report.coarse.settings()},
         "geometry": geometry_block(first, report.advice, config.adjust.test_level),
         "parts": parts_block(inputs.parts, config.adjust.test_level),
@@ -143,7 +144,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         "target": target,
         "passes": passes,
         **report.data_keys,
-        **_systematic(inputs.freed, config),
+        **systematic,
         "ins_drift": drift.model_dump() | {"from_files": list(drift_figures)},
         "ins_drift_estimated": estimated_drift_block(inputs.drift_figures),
         "inputs": inputs.provenance["inputs"],
@@ -180,14 +181,15 @@ def _further_head(head: str, inputs: Inputs, config: Config) -> HeadReport:
         mbes=config.further_heads[head], segment=config.segment, method=config.result, sides=config.target.sides
     )
     report = sonar_report(settings, evidence, ())
-    return head_report(head, evidence, report, _criteria(config, report))
+    systematic = _systematic(evidence.freed, config.further_heads[head], config)
+    return head_report(head, evidence, report, _criteria(config, report), systematic)
 
 
-def _systematic(freed: pd.DataFrame, config: Config) -> dict[str, Any]:
-    """Return the block ``systematic`` of calibration.json; empty if the laser is calibrated."""
-    if config.mbes is None:
+def _systematic(freed: pd.DataFrame, head: Mbes | None, config: Config) -> dict[str, Any]:
+    """Return the block ``systematic`` of calibration.json for a head; empty if the laser is calibrated."""
+    if head is None:
         return {}
-    stated = stated_of(config.laser, config.mbes, config.target, config.as_built)
+    stated = stated_of(config.laser, head, config.target, config.as_built)
     return {"systematic": systematic_block(freed, config.laser.mount_covariance, stated)}
 
 

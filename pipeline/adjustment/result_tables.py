@@ -15,7 +15,7 @@ from pipeline.adjustment.parameter_strengths import SetTest, parameter_tests, se
 from pipeline.adjustment.pattern_tests import passes_test
 from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.adjustment.residual_statistics import ResidualStatistics
-from pipeline.artefacts.catalogue.results import CELLS, SETS
+from pipeline.artefacts.catalogue.results import CELLS, HEAD_EFFECTS, SETS
 from pipeline.artefacts.to_tables import normal_columns
 from pipeline.console import plural
 from pipeline.maths.adjustment.parameter_tests import ParameterTest
@@ -59,7 +59,8 @@ def result_tables(
     return {
         "estimate": estimate.join(sigma_check(adjustment), on="unknown"),
         "covariance": _covariance_table(final, adjustment.state.mounts, random, total),
-        "freed": _single_parameter_table(problem, final, estimate, tests, by_session),
+        "freed": _single_parameter_table(problem, final, estimate, tests, by_session, np.arange(N_MOUNT)),
+        **_head_effects(problem, final, estimate, tests),
         "sets": _set_table(set_tests(final, tests), by_session),
         "groups": groups_table(adjustment),
         "summary": _summary_table(adjustment, passes_test(statistics.patterns, test_level)),
@@ -152,15 +153,16 @@ def _single_parameter_table(
     estimate: pd.DataFrame,
     tests: Sequence[ParameterTest],
     by_session: Mapping[str, float],
+    mount: Integers,
 ) -> pd.DataFrame:
-    """Return table ``freed``: the test of each additional parameter, and the effect of its error on the mount.
+    """Return table ``freed``: the test of each additional parameter, and the effect of its error on a mount.
 
     The parameters are fixed, or estimated with a value known beforehand (those of a laser's coarse mount among them),
     or named in adjust.free. Where values known beforehand correlate, the effects are of independent errors instead,
-    whose squares have the same sum.
+    whose squares have the same sum. ``mount`` (6,): places of the mount's parameters.
     """
     solution, consider = final.solution, problem.consider
-    mount, known = np.arange(N_MOUNT), problem.prior.known_parameters
+    known = problem.prior.known_parameters
     by_number = {test.parameter: test for test in tests}
     effects = np.zeros((N_MOUNT, len(final.names)))
     effects[:, solution.fixed] = solution.sensitivity_of(mount) * consider.sigmas[solution.fixed]
@@ -180,15 +182,28 @@ def _single_parameter_table(
         row |= {"value": test.value, "sigma": test.sigma, "expected": test.expected}
         row |= {"strength": test.strength, "by_session": by_session.get(name, np.nan)}
         rows.append(row | {f"effect_{axis}": effects[k, number] for k, axis in enumerate(MOUNT_NAMES)})
-    return pd.DataFrame([*rows, *_surface_rows(final.solution, surfaces)])
+    return pd.DataFrame([*rows, *_surface_rows(final.solution, surfaces, mount)])
 
 
-def _surface_rows(solution: Solution, surfaces: slice) -> list[dict[str, Any]]:
+def _head_effects(
+    problem: CalibrationProblem, final: FinalSolution, estimate: pd.DataFrame, tests: Sequence[ParameterTest]
+) -> dict[str, pd.DataFrame]:
+    """Return by name table ``head_effects``: what errors do to the mounts of further heads; nothing of one head."""
+    coarse = problem.model.coarse
+    tables = [
+        _single_parameter_table(problem, final, estimate, tests, {}, coarse.mount_columns(head)).assign(head=head)
+        for head in coarse.heads[1:]
+    ]
+    names = [column.name for column in HEAD_EFFECTS.columns]
+    return {"head_effects": pd.concat(tables, ignore_index=True)[names]} if tables else {}
+
+
+def _surface_rows(solution: Solution, surfaces: slice, mount: Integers) -> list[dict[str, Any]]:
     """Return rows of table ``freed`` with the effects of errors in what is known of the surfaces beforehand."""
     group = np.arange(surfaces.start, surfaces.stop)
-    if solution.deficiency or not np.all(np.isin([*range(N_MOUNT), *group], solution.estimated)):
+    if solution.deficiency or not np.all(np.isin([*mount, *group], solution.estimated)):
         return []
-    effects = solution.group_effects(np.arange(N_MOUNT), group)
+    effects = solution.group_effects(mount, group)
     if not np.any(effects):
         return []
     none = {"estimated": False, "known": False, "considered": 1.0}

@@ -14,6 +14,7 @@ import pandas as pd
 
 from pipeline.artefacts.catalogue.patent import CORRECTIONS
 from pipeline.artefacts.catalogue.points import FILES, UNSOUNDED_PASSES
+from pipeline.artefacts.catalogue.results import HEAD_EFFECTS
 from pipeline.artefacts.catalogue.target import PLANES, PROVISIONAL_MOUNT, SEGMENT_COUNTS, SOUNDING_MOMENTS, TARGET_POSE
 from pipeline.artefacts.counts import used
 from pipeline.artefacts.schema import OfFurtherHeads
@@ -45,15 +46,17 @@ class OfHeads:
     further_provisional_mount: Annotated[Tables, OfFurtherHeads(PROVISIONAL_MOUNT)]
     further_corrections: Annotated[Tables, OfFurtherHeads(CORRECTIONS)]
     counts_of_heads: Annotated[Tables, OfFurtherHeads(SEGMENT_COUNTS)]
+    head_effects: Annotated[pd.DataFrame | None, HEAD_EFFECTS] = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class HeadReport:
-    """A head of the sonar as the report has it: ``reasons`` are those that are about it alone."""
+    """A head of the sonar as the report has it: ``reasons`` are about it alone; ``systematic`` is that key."""
 
     judged: JudgedHead
     report: SensorReport
     reasons: Sequence[Statement]
+    systematic: Mapping[str, Any]
 
     @property
     def block(self) -> dict[str, Any]:
@@ -65,6 +68,7 @@ class HeadReport:
             **statement_lists("reason", self.reasons),
             "coarse": {"mount": self.report.coarse.settings()},
             "methods": self.report.methods,
+            **self.systematic,
         }
 
     def warnings(self, level: float) -> list[Statement]:
@@ -93,7 +97,9 @@ class HeadReport:
         return table.assign(**{column: table[column] + f" ({self.judged.name})"})
 
 
-def head_report(name: str, evidence: Evidence, report: SensorReport, criteria: Criteria) -> HeadReport:
+def head_report(
+    name: str, evidence: Evidence, report: SensorReport, criteria: Criteria, systematic: Mapping[str, Any]
+) -> HeadReport:
     """Return the report on one head.
 
     Parameters
@@ -102,9 +108,10 @@ def head_report(name: str, evidence: Evidence, report: SensorReport, criteria: C
     evidence : the evidence, with this head's tables
     report : the parts of the report that depend on the head
     criteria : limits of the verdict, and words for its reasons
+    systematic : the key ``systematic`` of calibration.json, for this head
     """
     judged = JudgedHead(name=name, evidence=evidence, methods=report.methods, criteria=criteria)
-    return HeadReport(judged=judged, report=report, reasons=own_reasons(judged, is_first=name == FIRST))
+    return HeadReport(judged=judged, report=report, reasons=own_reasons(judged), systematic=systematic)
 
 
 def evidence_of(evidence: Evidence, of_heads: OfHeads, head: str) -> Evidence:
@@ -128,6 +135,9 @@ def evidence_of(evidence: Evidence, of_heads: OfHeads, head: str) -> Evidence:
     own = {} if head == FIRST else _own_tables(of_heads, head)
     if head != FIRST:
         own["geometry"] = evidence.geometry.iloc[:0]  # it is about the first head
+        assert of_heads.head_effects is not None
+        effects = of_heads.head_effects[of_heads.head_effects["head"] == head].set_index("unknown").drop(columns="head")
+        own["freed"] = evidence.freed.assign(**effects.loc[evidence.freed["unknown"]].reset_index(drop=True))
     return replace(evidence, estimate=own_estimate, covariance=own_covariance, **own)
 
 

@@ -150,21 +150,18 @@ def rejections(
     if len(criteria.held) == len(PARAMETERS):
         words = "no mount parameter is good enough: none is within its limit and better than the coarse mount"
         reasons.append(Statement(ReasonCode.NO_PARAMETER_ESTIMABLE, words))
-    wide = [one for head in heads for one in named(head.name, _beyond_limits(head, is_first=head is first))]
+    wide = [one for head in heads for one in named(head.name, _beyond_limits(head))]
     reasons += [off_figures, *wide] if wide and off_figures is not None else wide
     return reasons + [one for head in heads for one in named(head.name, _patent_reasons(head))]
 
 
-def own_reasons(head: JudgedHead, is_first: bool) -> list[Statement]:
-    """Return the reasons that are about one head alone: doubts about it, too few soundings, its limits.
-
-    ``is_first``: it is the first head.
-    """
+def own_reasons(head: JudgedHead) -> list[Statement]:
+    """Return the reasons that are about one head alone: doubts about it, too few soundings, its limits."""
     if doubts := _doubts(head.evidence, head.criteria):
         return doubts
     return [
         *too_few_soundings(head.evidence.cells, head.name),
-        *_beyond_limits(head, is_first),
+        *_beyond_limits(head),
         *_patent_reasons(head),
     ]
 
@@ -177,13 +174,10 @@ def _patent_reasons(head: JudgedHead) -> list[Statement]:
     return list(patent_reasons(method, row, head.methods, head.criteria.limits))
 
 
-def _beyond_limits(head: JudgedHead, is_first: bool) -> list[Statement]:
-    """Return the reasons by the limits of the total sigmas.
-
-    ``is_first``: table ``freed`` has what errors do to the first head, so that the sources of its sigmas are known.
-    """
+def _beyond_limits(head: JudgedHead) -> list[Statement]:
+    """Return the reasons by the limits of the total sigmas."""
     adjusted, criteria = head.methods["adjustment"], head.criteria
-    sources = contributions(head.evidence.freed, adjusted, criteria.laser_correlates) if is_first else {}
+    sources = contributions(head.evidence.freed, adjusted, criteria.laser_correlates)
     wide = sigmas_above_limit(adjusted["sigma_mount_total"], criteria.limits, criteria.held, sources)
     return [*wide, *soundings_above_limit(adjusted["covariance_total"], criteria.limits)]
 

@@ -70,9 +70,8 @@ def _error_notes(errors: Mapping[str, Any] | None) -> Iterator[str]:
         return
     if errors["cautious"]:
         yield (
-            "a result does not tell its errors apart (of an older version, or of a further head): both total "
-            "covariances were added, as if the sessions shared no error; of an older version, poolcal run again makes "
-            "the test sharper"
+            "a result is of an older version, which did not tell its errors apart: both total covariances were added, "
+            "as if the sessions shared no error; poolcal run again makes the test sharper"
         )
     for words in errors["differing"]:
         yield f"{words} is not the same in both: its errors were counted as each session's own"

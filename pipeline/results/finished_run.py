@@ -75,15 +75,11 @@ class FinishedRun:
         return Tables(self.path if head == "mbes" else self.path / OF_HEADS / str(head))
 
     def of_head(self, head: str) -> "FinishedRun":
-        """Return the run as if the sonar had this head alone, with its blocks and settings in place of the first's.
-
-        The errors that two sessions share are known of the first head alone. A further head has all of them in its
-        total covariance.
-        """
+        """Return the run as if the sonar had this head alone, with its blocks and settings in place of the first's."""
         if len(self.heads) == 1:
             return self
         (block,) = (block for block in self.result["heads"] if block["name"] == head)
-        own = {"mbes": block, "methods": block["methods"], "coarse": block["coarse"], "heads": [], "head": head}
-        result = {key: value for key, value in self.result.items() if head == self.heads[0] or key != "systematic"}
+        own = {key: block[key] for key in ("methods", "coarse", "systematic")}
+        own |= {"mbes": block, "heads": [], "head": head}
         settings = replace(self.settings, session=self.settings.session.alone(head))
-        return replace(self, settings=settings, result=result | own)
+        return replace(self, settings=settings, result={**self.result, **own})

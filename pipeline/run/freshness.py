@@ -16,7 +16,7 @@ from pipeline.run import manifest, provenance
 from pipeline.run.digests import Digests
 from pipeline.run.progress import Progress
 from pipeline.run.settings import Settings
-from pipeline.run.stage_protocol import inputs_in, name_of
+from pipeline.run.stage_protocol import Marker, inputs_in, name_of
 from pipeline.run.workers import SERIAL, Workers
 
 SENSORS = ("ins", "laser", *HEADS)
@@ -72,7 +72,7 @@ def key_of(this: Run, stage: ModuleType) -> manifest.Key:
     """Return the key (everything on which the result depends) that the stage would have if it ran now."""
     raw: dict[str, str] = {}
     inputs: dict[str, str] = {}
-    for marker in inputs_in(this.stages, stage).values():
+    for marker in inputs_of(this, stage).values():
         if isinstance(marker, RawFiles):
             raw |= raw_of(this, marker.sensor)
         elif isinstance(marker, Provenance):
@@ -87,6 +87,25 @@ def key_of(this: Run, stage: ModuleType) -> manifest.Key:
     if "svp" in (config.get("mbes") or {}):
         raw |= cast_digest(this)
     return manifest.Key(config, raw, inputs, provenance.source_digests(stage), provenance.library_versions())
+
+
+def inputs_of(this: Run, stage: ModuleType) -> dict[str, Marker]:
+    """Return the artefacts that a stage reads in this run, by field.
+
+    An optional table is left out if its stage has not written it; the stage then gets None.
+    """
+    optional = {field.name for field in dataclasses.fields(stage.Inputs) if field.default is None}
+    return {
+        name: marker
+        for name, marker in inputs_in(this.stages, stage).items()
+        if name not in optional or not isinstance(marker, Artefact) or _is_written(this, marker)
+    }
+
+
+def _is_written(this: Run, marker: Artefact) -> bool:
+    """Return whether a stage's result has an artefact; also true as long as the stage has no result."""
+    owner = manifest.read_manifest(this.folder(marker.owner))
+    return owner is None or file_name(marker) in manifest.artefact_digests(owner.outputs)
 
 
 def raw_of(this: Run, sensor: str) -> dict[str, str]:

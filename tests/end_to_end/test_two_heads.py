@@ -164,6 +164,7 @@ def test_a_head_that_moved_is_the_one_that_diff_names(session: Path, run: Path, 
     first, second = json.loads(told.out)["heads"]
     assert first["answer"] != "moved"
     assert second["answer"] == "moved"
+    assert not second["errors"]["cautious"]
     assert [row["parameter"] for row in second["parameters"] if row["moved"]] == ["yaw"]
 
 

@@ -161,3 +161,24 @@ def test_soundings_outside_the_passes_of_the_first_head_are_counted(noisy_two: S
     left_out, of_all = (int(number.replace(",", "")) for number in re.findall(r"\b[0-9][0-9,]*", warning)[:2])
     assert 0.1 < left_out / of_all < 0.3  # one pass of four, at 8 m
     assert result["verdict"] == "accepted", result["reasons"]
+
+
+def test_each_head_tells_its_systematic_errors_apart(found_two: dict[str, Any]) -> None:
+    """Noise and the squares of the effects add up to the total covariance; errors that are common act on both heads."""
+    result = result_of(found_two)
+    assert result["heads"][0]["systematic"] == result["systematic"]
+    of_heads = []
+    for head in result["heads"]:
+        effects = [column for block in head["systematic"].values() for column in block["effects"].values()]
+        E = np.array(effects).T
+        np.testing.assert_allclose(
+            np.array(head["covariance"]) + E @ E.T, head["covariance_total"], rtol=1e-6, atol=1e-12
+        )
+        of_heads.append(E)
+    cross = np.array(result["heads_covariance"]["covariance_total"]) - result["heads_covariance"]["covariance"]
+    names = [name for block in result["systematic"].values() for name in block["effects"]]
+    # those of the surfaces are roots of each head's own part: their product is no part across the heads
+    kept = np.array([not name.startswith("surfaces_") for name in names])
+    np.testing.assert_allclose(
+        of_heads[0][:, kept] @ of_heads[1][:, kept].T, cross[:6, 6:], rtol=0.02, atol=0.02 * np.abs(cross).max()
+    )
