@@ -131,6 +131,7 @@ montecarlo: $(SETUP) ## many simulated sessions: are the predicted sigmas true?
 	$(PY) -m tools.laser --drift "within 10 s" --sessions 100
 	$(PY) -m tools.laser --drift "within 30 s" --sessions 100
 	$(PY) -m tools.laser_pairs
+	$(PY) -m tools.two_heads
 	$(PY) -m tools.stress
 	$(PY) -m tools.place_campaign --sessions 12 > docs/accuracy/places.md
 	$(PY) -m tools.accuracy

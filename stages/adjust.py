@@ -3,6 +3,7 @@
 The sonar is calibrated against the surfaces that the laser measures, or the laser against the target's design.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Annotated
 
@@ -10,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline.adjustment.consider import known_parameters, sonar_errors, wet_faces_uncertain
+from pipeline.adjustment.further_heads import in_passes
 from pipeline.adjustment.ins_drift import drift_model, drift_prior, pose_noise
 from pipeline.adjustment.iteration import MountAdjustment
 from pipeline.adjustment.laser_design import laser_consider, laser_problem, surveyed_displacement
@@ -30,6 +32,7 @@ from pipeline.artefacts.catalogue.results import (
     FREED,
     GEOMETRY,
     GROUPS,
+    HEAD_EFFECTS,
     LEFT_OUT,
     PARTS,
     PATTERNS,
@@ -48,6 +51,7 @@ from pipeline.artefacts.catalogue.target import (
     TARGET_POSE,
 )
 from pipeline.artefacts.from_tables import target_frame, trajectory_in_target
+from pipeline.artefacts.schema import OfFurtherHeads
 from pipeline.artefacts.streams import Stream
 from pipeline.config.pool import Adjust, AsBuilt, Ingest, Segment
 from pipeline.config.session import Drift, Ins, Laser, Mbes
@@ -71,6 +75,7 @@ class Config:
     ins: Ins
     laser: Laser
     mbes: Mbes | None
+    further_heads: dict[str, Mbes]  # of the sonar, by name
     laser_fit: LaserPrior | None
 
 
@@ -88,6 +93,8 @@ class Inputs:
     planes: Annotated[pd.DataFrame, PLANES]
     laser_labelled: Annotated[Stream, LASER_LABELLED]
     soundings_labelled: Annotated[Stream, SOUNDINGS_LABELLED]
+    of_further_heads: Annotated[Mapping[str, Stream], OfFurtherHeads(SOUNDINGS_LABELLED)]
+    mounts_of_further_heads: Annotated[Mapping[str, pd.DataFrame], OfFurtherHeads(PROVISIONAL_MOUNT)]
 
 
 @dataclass(frozen=True)
@@ -111,19 +118,22 @@ class Outputs:
     residuals: Annotated[pd.DataFrame, RESIDUALS]
     residual_bins: Annotated[pd.DataFrame, RESIDUAL_BINS]
     residual_map: Annotated[pd.DataFrame, RESIDUAL_MAP]
+    head_effects: Annotated[pd.DataFrame | None, HEAD_EFFECTS] = None  # of a sonar with several heads
 
 
 def run(inputs: Inputs, config: Config) -> Outputs:
-    """Adjust the mount of the sensor that is calibrated."""
+    """Adjust the mount of the sensor that is calibrated, or of all heads of the sonar."""
     # Set up the problem of the sensor that is calibrated.
     drift = drift_model(config.ins, inputs.ins_sigmas, inputs.passes)
     problem = calibration_problem(session_data(inputs, config, drift), inputs, config)
 
     # Adjust the mount to all labelled points of the sensors that take part.
     labelled = {"laser": inputs.laser_labelled, "mbes": inputs.soundings_labelled}
+    labelled |= in_passes(inputs.of_further_heads, inputs.passes)
     points = {sensor: labelled[sensor] for sensor in problem.model.sigmas}
-    gate_m = float(inputs.provisional_mount["gate_m"].iloc[0])
-    adjustment, points, left_out = adjust_true_faces(problem, points, config.adjust, config.ingest.max_gap_s, gate_m)
+    found = {"mbes": inputs.provisional_mount, **inputs.mounts_of_further_heads}
+    gates_m = {head: float(mount["gate_m"].iloc[0]) for head, mount in found.items() if head in points}
+    adjustment, points, left_out = adjust_true_faces(problem, points, config.adjust, config.ingest.max_gap_s, gates_m)
 
     # Compute the residuals of all points at the adjusted values, and make the tables.
     statistics = residual_statistics(problem, adjustment, points, inputs.passes, config.adjust)
@@ -158,9 +168,11 @@ def calibration_problem(session: SessionData, inputs: Inputs, config: Config) ->
     """Return the problem of the sensor that is calibrated, from its coarse mount, with errors of fixed parameters."""
     laser, as_built = config.laser, config.as_built
     if config.mbes is not None:
-        problem = sonar_problem(session, mount_of(config.mbes.mount), {"laser": laser, "mbes": config.mbes})
+        heads = {"mbes": config.mbes, **config.further_heads}
+        further = {head: mount_of(block.mount) for head, block in config.further_heads.items()}
+        problem = sonar_problem(session, mount_of(config.mbes.mount), {"laser": laser, **heads}, further)
         state = problem.model.coarse
-        errors = sonar_errors(problem.model.names, laser, config.mbes, as_built, session.target.depth_m)
+        errors = sonar_errors(problem.model.names, laser, heads, as_built, session.target.depth_m)
         known = known_parameters(state, errors, config.adjust.free)
         uncertain = wet_faces_uncertain(as_built.offset_sigma_m, as_built.angle_sigma_deg)
         prior = replace(problem.prior, parameters=known, from_start=uncertain)

@@ -5,13 +5,15 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.artefacts.schema import Artefact, Document, RawFiles
+from pipeline.artefacts.schema import Artefact, Document, OfFurtherHeads, RawFiles
 from pipeline.artefacts.streams import EMPTY_STREAM, MemoryPart, Stream
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import SessionConfig
 from pipeline.config.stage_settings import settings_by_name, stage_config
-from pipeline.run.stage_protocol import declared, inputs_in, name_of, run_in_memory
+from pipeline.run.stage_protocol import declared, inputs_in, name_of, of_each_head, run_in_memory
 from stages import load
+
+NO_PROVENANCE: dict[str, Any] = {"inputs": {}, "software": {}}
 
 
 def calibrate_in_memory(
@@ -29,7 +31,7 @@ def calibrate_in_memory(
     session, pool
         The settings of the session and of the pool.
     raw : mapping
-        The columns that the readers return, by sensor: ins, laser, mbes.
+        The columns that the readers return, by sensor: ins, laser, mbes, and further heads.
     until : str
         The last stage to run.
     changed : callable
@@ -44,16 +46,23 @@ def calibrate_in_memory(
     """
     artefacts: dict[str, Any] = {}
 
+    stages = load(session.calibrated)
+    further = {
+        head: calibrate_in_memory(
+            session.alone(head), pool, {**raw, "mbes": raw[head]}, name_of(of_each_head(stages)[-1]), changed
+        )
+        for head in list(session.heads)[1:]
+    }
+
     def input_of(marker: Any) -> Any:
+        if isinstance(marker, OfFurtherHeads):
+            return {head: found[_key(marker.artefact)] for head, found in further.items()}
         if isinstance(marker, RawFiles):
             present = getattr(session, marker.sensor) is not None
             return Stream((MemoryPart(marker.sensor, raw[marker.sensor]),)) if present else EMPTY_STREAM
-        if isinstance(marker, (Artefact, Document)):
-            return artefacts[f"{marker.owner}/{marker.name}"]
-        return {"inputs": {}, "software": {}}
+        return artefacts.get(_key(marker)) if isinstance(marker, (Artefact, Document)) else NO_PROVENANCE
 
     settings = settings_by_name(pool, session)
-    stages = load(session.calibrated)
     names = [name_of(stage) for stage in stages]
     for stage in stages:
         made = {key: value for key, value in (known or {}).items() if key.startswith(f"{name_of(stage)}/")}
@@ -62,8 +71,12 @@ def calibrate_in_memory(
             outputs = run_in_memory(stage, inputs, stage_config(stage.Config, settings))
             for name, marker in declared(stage.Outputs).items():
                 if isinstance(marker, (Artefact, Document)) and getattr(outputs, name) is not None:
-                    made[f"{marker.owner}/{marker.name}"] = getattr(outputs, name)
+                    made[_key(marker)] = getattr(outputs, name)
         artefacts |= {key: changed(key, value) for key, value in made.items()}
         if name_of(stage) == until:
             break
     return artefacts
+
+
+def _key(marker: Artefact | Document) -> str:
+    return f"{marker.owner}/{marker.name}"

@@ -29,6 +29,7 @@ from pipeline.report.calibration_document import (
 )
 from pipeline.report.drift_check import NO_DRIFT, check_ins_drift, figures_disagree
 from pipeline.report.evidence import Evidence
+from pipeline.report.heads import FIRST, HeadReport, OfHeads, evidence_of, head_report, heads_keys, outside_passes
 from pipeline.report.hypotheses import hypotheses_block
 from pipeline.report.label_checks import unsettled_labels
 from pipeline.report.laser_report import laser_report
@@ -57,6 +58,7 @@ class Config:
     ins: Ins
     laser: Laser
     mbes: Mbes | None
+    further_heads: dict[str, Mbes]  # of the sonar, by name
     calibrated: Calibrated
     laser_fit: LaserFit | None
     segment: Segment
@@ -76,7 +78,7 @@ class Config:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Inputs(Evidence):
+class Inputs(Evidence, OfHeads):
     """Tables of the earlier stages, and the run's provenance: digests of raw files, versions of software."""
 
     provenance: Annotated[dict[str, Any], Provenance]
@@ -94,8 +96,9 @@ class Outputs:
 
 def run(inputs: Inputs, config: Config) -> Outputs:
     """Judge a calibration, and return it as documents for programs and for people."""
-    passes = pass_rows(inputs.passes, inputs.cells)
-    report = _sensor_report(inputs, config, passes)
+    first, passes = evidence_of(inputs, inputs, FIRST), pass_rows(inputs.passes, inputs.cells)
+    report = _sensor_report(first, config, passes)
+    further = [_further_head(head, inputs, config) for head in config.further_heads]
     model = target_of(config.target)
     shape = measured_shape(inputs.planes, inputs.patterns, model)
     target = target_block(inputs.target_pose.iloc[0]) | {"as_found": shape}
@@ -104,20 +107,23 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     source = "the INS's files say" if drift_figures else "ins.drift says"
     drift_check, criteria = check_ins_drift(inputs.drift, drift, source), _criteria(config, report)
     off_figures = figures_disagree(inputs.drift_figures, source)
-    reasons = rejections(inputs, report.methods, criteria, drift_check, off_figures)
+    systematic = _systematic(inputs.freed, config.mbes, config)
+    reasons = rejections(first, report.methods, criteria, drift_check, off_figures, [head.judged for head in further])
     warnings = [
         *geometry_gaps(inputs.geometry, report.methods["adjustment"]["sigma_mount_total"]),
         *unsettled_labels(float(inputs.provisional_mount["label_change"].iloc[0])),
         *unexpected_noise(inputs.groups),
         *uneven_noise(inputs.groups),
         *correlated_beams(inputs.groups),
-        *sigmas_too_small(inputs.estimate, config.adjust.test_level),
+        *sigmas_too_small(first.estimate, config.adjust.test_level),
         *errors_allowed_for(inputs.freed, config.adjust.test_level),
         *target_off_origin(target), *target_found(model), *unsurveyed_walls(inputs.left_out, inputs.groups),
         *(check for check in (drift_check, off_figures) if check is not None and check not in (NO_DRIFT, *reasons)),
         *report.pass_warnings,
         *deviations_from_design(shape, design_shape(model), shape_errors(inputs.planes, model)),
         *report.cast_warnings,
+        *outside_passes(inputs.cells, inputs.counts_of_heads),
+        *(one for head in further for one in head.warnings(config.adjust.test_level)),
     ]
     verdict = "rejected" if reasons else "accepted"
     result = {
@@ -131,27 +137,30 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         "limits": limits_document(config.limits),
         "result": report.method,
         **report.result_keys,
+        **heads_keys(head_report(FIRST, first, report, criteria, systematic), further, inputs.covariance),
         "coarse": {"mount": report.coarse.settings()},
-        "geometry": geometry_block(inputs, report.advice, config.adjust.test_level),
+        "geometry": geometry_block(first, report.advice, config.adjust.test_level),
         "parts": parts_block(inputs.parts, config.adjust.test_level),
         "free": free_block(inputs.freed),
         "target": target, **left_out_block(inputs.left_out),
         "passes": passes,
         **report.data_keys,
-        **_systematic(inputs.freed, config),
+        **systematic,
         "ins_drift": drift.model_dump() | {"from_files": list(drift_figures)},
         "ins_drift_estimated": estimated_drift_block(inputs.drift_figures),
         "inputs": inputs.provenance["inputs"],
         "software": inputs.provenance["software"],
-        **instruments_block({"ins": config.ins, "laser": config.laser, **report.instruments}),
+        **instruments_block({"ins": config.ins, "laser": config.laser, **report.instruments, **config.further_heads}),
     }
     json_text, yaml_text = documents(result)
-    return Outputs(
-        calibration=calibration_table(report.methods, report.coarse),
-        calibration_json=json_text,
-        calibration_yaml=yaml_text,
-        closing=report.closing,
-    )
+    return Outputs(calibration_json=json_text, calibration_yaml=yaml_text, **_tables(report, further))
+
+
+def _tables(report: SensorReport, further: Sequence[HeadReport]) -> dict[str, Any]:
+    """Return by name the tables of all heads: the rows of the first, then those of the further ones."""
+    calibration = [calibration_table(report.methods, report.coarse), *(head.calibration for head in further)]
+    closing = None if report.closing is None else pd.concat([report.closing, *(head.closing for head in further)])
+    return {"calibration": pd.concat(calibration), "closing": closing}
 
 
 def _sensor_report(evidence: Evidence, config: Config, passes: Sequence[dict[str, Any]]) -> SensorReport:
@@ -166,11 +175,22 @@ def _sensor_report(evidence: Evidence, config: Config, passes: Sequence[dict[str
     return sonar_report(settings, evidence, passes)
 
 
-def _systematic(freed: pd.DataFrame, config: Config) -> dict[str, Any]:
-    """Return the block ``systematic`` of calibration.json; empty if the laser is calibrated."""
-    if config.mbes is None:
+def _further_head(head: str, inputs: Inputs, config: Config) -> HeadReport:
+    """Return the report on a further head of the sonar, which was adjusted together with the first."""
+    evidence = evidence_of(inputs, inputs, head)
+    settings = SonarSettings(
+        mbes=config.further_heads[head], segment=config.segment, method=config.result, sides=config.target.sides
+    )
+    report = sonar_report(settings, evidence, ())
+    systematic = _systematic(evidence.freed, config.further_heads[head], config)
+    return head_report(head, evidence, report, _criteria(config, report), systematic)
+
+
+def _systematic(freed: pd.DataFrame, head: Mbes | None, config: Config) -> dict[str, Any]:
+    """Return the block ``systematic`` of calibration.json for a head; empty if the laser is calibrated."""
+    if head is None:
         return {}
-    stated = stated_of(config.laser, config.mbes, config.target, config.as_built)
+    stated = stated_of(config.laser, head, config.target, config.as_built)
     return {"systematic": systematic_block(freed, config.laser.mount_covariance, stated)}
 
 

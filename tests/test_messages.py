@@ -53,7 +53,7 @@ def test_a_second_head_has_a_session_of_its_own(tmp_path: Path) -> None:
     content = _session()
     content["mbes2"] = _session()["mbes"]
     said = _refusal(tmp_path, content)
-    assert "mbes2: unknown key; one mbes is calibrated at a time: write one session.yaml for each" in said
+    assert "mbes2: unknown key; write all heads under mbes, as a list of blocks" in said
 
 
 @pytest.mark.parametrize(("week", "said"), [(370, "370 + 2048 = 2418"), (999, "999 + 1024 = 2023")])

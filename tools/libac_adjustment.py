@@ -27,7 +27,8 @@ from pipeline.config.stage_settings import LaserPrior, narrow
 from pipeline.maths.adjustment.body_motion import BodyMotion
 from pipeline.maths.adjustment.drift_likelihood import DriftPrior
 from pipeline.maths.adjustment.face_shifts import Faces
-from pipeline.maths.adjustment.parameters import ObservedSurface, State
+from pipeline.maths.adjustment.observed_surface import ObservedSurface
+from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.pose_errors import PoseNoise
 from pipeline.maths.adjustment.pseudo_observations import ParameterPrior
 from pipeline.maths.adjustment.solution import ConsiderErrors

@@ -12,7 +12,7 @@ from pipeline.adjustment.point_sums import COLUMNS, summed
 from pipeline.adjustment.stored_sums import StoredSums
 from pipeline.artefacts.streams import Batch, Stream
 from pipeline.maths.adjustment.interval_sums import Intervals, IntervalSums
-from pipeline.maths.adjustment.parameters import State
+from pipeline.maths.adjustment.parameters import State, kind_of
 from pipeline.maths.adjustment.robust_weights import LEAST_SCALE, robust_scale
 from pipeline.maths.adjustment.weighting import Weighting, edge_shares, rescaled, scatter, shrunk_factors
 from pipeline.maths.kernels.interval_group import COUNT, CUT, FIRST_BIN, INFORMATION, REDUCED
@@ -106,12 +106,12 @@ def accumulate(streams: Mapping[str, Stream], model: ObservationModel, values: C
     groups: dict[Group, GroupStatistics] = {}
 
     def pieces(sensor: str, stream: Stream) -> Iterator[IntervalSums]:
-        for piece, statistics in stream.only(COLUMNS[sensor]).fold(_accumulate_batch, model, sensor, values):
+        for piece, statistics in stream.only(COLUMNS[kind_of(sensor)]).fold(_accumulate_batch, model, sensor, values):
             for key, group in statistics.items():
                 groups[key] = groups[key] + group if key in groups else group
             yield piece
 
-    sums = {name: StoredSums.of(pieces(name, stream), N_FEATURES[name]) for name, stream in streams.items()}
+    sums = {name: StoredSums.of(pieces(name, stream), N_FEATURES[kind_of(name)]) for name, stream in streams.items()}
     return Accumulation(sums, groups)
 
 

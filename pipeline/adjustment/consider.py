@@ -8,7 +8,7 @@ and ``Solution.total_covariance`` the sum.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pipeline.config.pool import AsBuilt
 from pipeline.config.session import Laser, Mbes
 from pipeline.maths.adjustment.design_matrix import SPEED_M_S
-from pipeline.maths.adjustment.parameters import LASER_PARAMETERS, PROJECTOR_PARAMETERS, State
+from pipeline.maths.adjustment.parameters import LASER_PARAMETERS, PROJECTOR_PARAMETERS, State, of_head
 from pipeline.maths.adjustment.pseudo_observations import ParameterPrior
 from pipeline.maths.adjustment.solution import ConsiderErrors
 from pipeline.maths.mount_parameters import N_MOUNT
@@ -105,9 +105,12 @@ def laser_errors(names: Sequence[str], laser: Laser, as_built: AsBuilt) -> Consi
 
 
 def sonar_errors(
-    names: Sequence[str], laser: Laser, mbes: Mbes, as_built: AsBuilt, depth_m: float | None = None
+    names: Sequence[str], laser: Laser, heads: Mapping[str, Mbes], as_built: AsBuilt, depth_m: float | None = None
 ) -> ConsiderErrors:
-    """Return the a-priori errors for a calibration of the sonar: zero for the sonar's mount and the surfaces.
+    """Return the a-priori errors for a calibration of the sonar: zero for the sonar's mounts and the surfaces.
+
+    The heads of a sonar are in one water, whose errors are therefore common to them. All other errors are each head's
+    own: its clock, its detection, its transmitter's place, the water at its arrays.
 
     ``sound_speed`` is an error common to the column and to the water at the arrays (of the probe, or of the cast as a
     whole), ``steering_speed`` the difference of the two. They are independent, each with the sigma σ =
@@ -118,26 +121,39 @@ def sonar_errors(
     ----------
     names : sequence of str
         Names of all parameters.
-    laser, mbes : Laser, Mbes
-        The session's sensors.
+    laser : Laser
+        The session's laser.
+    heads : mapping of Mbes
+        The heads of the sonar by name, the first one first.
     as_built : AsBuilt
         Sigmas of the wet faces against the dry ones.
     depth_m : float, optional
         Depth of the target's lower end below the water.
     """
     errors = laser_errors(names, laser, as_built)
-    of_sonar = {
-        "mbes_range": mbes.range_bias_sigma_m,
-        "mbes_latency": mbes.latency_sigma_s,
+    (first, mbes), *_ = heads.items()
+    of_water = {
         "sound_speed": mbes.sound_speed_sigma_m_s / SPEED_M_S,
         "sound_speed_gradient": gradient_sigma(mbes, depth_m),
+    }
+    of_heads = {"" if head == first else head: _own_errors(block) for head, block in heads.items()}
+    sigmas = []
+    for name, sigma in zip(names, errors.sigmas.tolist(), strict=True):
+        head, own = of_head(name)
+        sigmas.append({**of_heads[head], **of_water}.get(own, sigma))
+    return ConsiderErrors(np.array(sigmas), errors.blocks)
+
+
+def _own_errors(mbes: Mbes) -> dict[str, float]:
+    """Return the sigmas of the errors that are a head's own, by the names of the first head's parameters."""
+    return {
+        "mbes_range": mbes.range_bias_sigma_m,
+        "mbes_latency": mbes.latency_sigma_s,
         "steering_speed": mbes.sound_speed_sigma_m_s / SPEED_M_S,
         "mbes_incidence": mbes.incidence_bias_sigma_m,
         "mbes_level_range": mbes.level_bias_sigma_m,
         **dict.fromkeys(PROJECTOR_PARAMETERS, mbes.projector_sigma_m),
     }
-    sigmas = [of_sonar.get(name, sigma) for name, sigma in zip(names, errors.sigmas.tolist(), strict=True)]
-    return ConsiderErrors(np.array(sigmas), errors.blocks)
 
 
 def known_parameters(state: State, errors: ConsiderErrors, free: Sequence[str]) -> ParameterPrior | None:
@@ -156,7 +172,7 @@ def known_parameters(state: State, errors: ConsiderErrors, free: Sequence[str]) 
     """
     numbers = [
         number
-        for number, name in enumerate(state.names)
+        for number, (_, name) in enumerate(map(of_head, state.names))
         if name.startswith(ESTIMATED_WITH_PRIOR) and name not in free and errors.sigmas[number] > 0
     ]
     if not numbers:

@@ -11,6 +11,7 @@ from typing import Any, Literal
 from pipeline.config.pool import AsBuilt
 from pipeline.config.session import Laser, Mbes
 from pipeline.config.target import Target
+from pipeline.maths.adjustment.parameters import of_head
 
 Owner = Literal["session", "laser_mount", "laser", "sonar", "target"]  # what an error belongs to
 OWNERS: dict[Owner, str] = {
@@ -104,12 +105,13 @@ UNKNOWN = ErrorSource("", "", "session", "not in the table: then its own, for wh
 
 
 def source_of(parameter: str) -> ErrorSource:
-    """Return the source of a parameter's error, by the parameter's name.
+    """Return the source of a parameter's error, by the parameter's name; of a further head as of the first.
 
     >>> source_of("sound_speed_gradient").owner, source_of("wet_P1_shift").owner
     ('session', 'target')
     """
-    return next((source for source in ERROR_SOURCES if parameter.startswith(source.beginning)), UNKNOWN)
+    _, name = of_head(parameter)
+    return next((source for source in ERROR_SOURCES if name.startswith(source.beginning)), UNKNOWN)
 
 
 def stated_of(laser: Laser, mbes: Mbes, target: Target, as_built: AsBuilt) -> dict[Owner, Any]:

@@ -44,14 +44,14 @@ def with_shared_noise(
     """
     sums, of_face = dict(sums_by_face), problem.model.faces.surface
     changes: list[tuple[str, Callable[[IntervalSums], IntervalSums]]] = []
-    if adjustment.ping is not None:
+    for head, ping in adjustment.pings.items():
         with_pings = partial(
             with_ping_noise,
-            noise=adjustment.ping,
+            noise=ping,
             surfaces=adjustment.last.linearisation.state.surfaces,
             white=problem.prior.noise.white,
         )
-        changes.append(("mbes", with_pings))
+        changes.append((head, with_pings))
     for sensor, rough in adjustment.rough.items():
         changes.append((sensor, partial(with_design_effects, effects=rough.effects)))
     for sensor, change in changes:

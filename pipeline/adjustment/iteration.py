@@ -18,7 +18,7 @@ from pipeline.artefacts.streams import Stream
 from pipeline.maths.adjustment.drift_likelihood import DriftFigures
 from pipeline.maths.adjustment.eliminate_drift import NormalEquations
 from pipeline.maths.adjustment.eliminate_white_noise import ReducedIntervals
-from pipeline.maths.adjustment.parameters import State
+from pipeline.maths.adjustment.parameters import State, kind_of
 from pipeline.maths.adjustment.ping_noise import PingNoise, ping_noise, with_ping_noise
 from pipeline.maths.adjustment.pose_errors import DriftEstimate, PoseNoise
 from pipeline.maths.adjustment.roughness import Roughness
@@ -46,11 +46,11 @@ class MountAdjustment:
 
     accumulation: sums at the final values; epoch_factors: by sensor, the variance factor of the error common to all
     points of an interval (empty without a solution; the laser's factor, if it is well known, is already in the INS's
-    white noise of the solution); ping: noise that the soundings of a ping share, as the sums have it (None without a
-    sonar or a solution); rough: by sensor, the roughness of walls that nobody has surveyed, as the sums have it;
-    drift_figures: the figures of the drift, which the solution has; equations: normal equations of all parameters, also
-    of the fixed ones; last: the values of the final solution; rival: another minimum of the sum of squares, if there is
-    one.
+    white noise of the solution); pings: by head of the sonar, noise that the soundings of a ping share, as the sums
+    have it (empty without a sonar or a solution); rough: by sensor, the roughness of walls that nobody has surveyed, as
+    the sums have it; drift_figures: the figures of the drift, which the solution has; equations: normal equations of
+    all parameters, also of the fixed ones; last: the values of the final solution; rival: another minimum of the sum of
+    squares, if there is one.
     """
 
     state: State
@@ -58,7 +58,7 @@ class MountAdjustment:
     weighting: Weighting
     accumulation: Accumulation
     epoch_factors: Mapping[str, EpochVarianceFactor]
-    ping: PingNoise | None
+    pings: Mapping[str, PingNoise]
     rough: Mapping[str, Roughness]
     drift_figures: DriftFigures
     equations: NormalEquations
@@ -117,8 +117,8 @@ def adjust_mount(
     gap_s : float
         A longer time (s) without observations interrupts the knots of the drift.
     """
-    prior, ping = problem.prior, None
-    figures = DriftFigures.of_session(prior.noise)
+    prior = problem.prior
+    figures, pings = DriftFigures.of_session(prior.noise), dict[str, PingNoise]()
     chosen = chosen_iteration(problem, streams, settings, gap_s)
     weighted = chosen.weighted
     # parameters that the points tell of, and that are known beforehand, are estimated with the last weights
@@ -129,12 +129,8 @@ def adjust_mount(
     if not weighted.deficient:
         # take the INS's noise from the data: white noise, then drift; further steps have the last weights
         factors["laser"] = last.record_noise(prior.noise)
-        if "mbes" in streams:  # a part of the sonar's noise is common to a ping
-            soundings, surfaces = last.linearisation.sums["mbes"], last.linearisation.state.surfaces
-            ping = ping_noise(soundings, surfaces, prior.noise.white, factors["laser"])
-            with_noise = partial(with_ping_noise, noise=ping, surfaces=surfaces, white=prior.noise.white)
-            last = replace(last, linearisation=last.linearisation.with_sums("mbes", soundings.stored(with_noise)))
-            factors["mbes"] = ping.epoch
+        last, pings = _with_ping_noise(last, prior.noise.white, factors["laser"])
+        factors |= {head: ping.epoch for head, ping in pings.items()}
         noise = noise_seen_by_laser(prior.noise, factors["laser"])
         for _ in range(ROUGH_ROUNDS if prior.from_start else 1):
             if prior.from_start:  # a wall that nobody has surveyed may be rough
@@ -151,7 +147,7 @@ def adjust_mount(
         weighting=weighted.weighting,
         accumulation=replace(weighted.accumulation, sums=last.linearisation.sums),
         epoch_factors=factors,
-        ping=ping,
+        pings=pings,
         rough=rough,
         drift_figures=figures,
         equations=equations,
@@ -165,8 +161,31 @@ def adjust_mount(
 
 def _closed(last: Iterate, noise: PoseNoise, estimated: Integers, reduced: ReducedIntervals) -> tuple[Iterate, bool]:
     """Return the values after steps with the last weights, and whether the last step was small."""
+    mounts = np.flatnonzero(np.isin(estimated, last.linearisation.state.mounts))
     for closing in range(CLOSING_STEPS):
         last, solution = last.stepped(noise, estimated, None if closing else reduced)
-        if is_small(solution, CONVERGED):
+        if is_small(solution, CONVERGED, mounts):
             return last, True
     return last, False
+
+
+def _with_ping_noise(last: Iterate, white: Array, laser: EpochVarianceFactor) -> tuple[Iterate, dict[str, PingNoise]]:
+    """Return the values with the noise that the soundings of a ping share in their sums; and this noise by head.
+
+    Parameters
+    ----------
+    last : Iterate
+        The values.
+    white : (6,) array
+        Standard deviations of a record's white noise, m and rad.
+    laser : EpochVarianceFactor
+        Variance factor of this noise, from the laser's points.
+    """
+    pings = {}
+    for head, soundings in last.linearisation.sums.items():
+        if kind_of(head) == "mbes":
+            surfaces = last.linearisation.state.surfaces
+            pings[head] = ping_noise(soundings, surfaces, white, laser)
+            with_pings = soundings.stored(partial(with_ping_noise, noise=pings[head], surfaces=surfaces, white=white))
+            last = replace(last, linearisation=last.linearisation.with_sums(head, with_pings))
+    return last, pings

@@ -12,10 +12,8 @@ from pipeline.artefacts.catalogue.results import GROUPS
 from pipeline.maths.adjustment.robust_weights import robust_scale
 from pipeline.maths.adjustment.score_check import score_check
 from pipeline.maths.adjustment.weighting import PRIOR_DOF, Scatter, scatter
-from pipeline.maths.mount_parameters import N_MOUNT
 
 COMMON_ERROR = {"laser": "ins_white", "mbes": "ping"}  # name of the error that an interval's points have in common
-OF_KIND = {"laser": ("laser", "laser"), "mbes": ("mbes_vertical", "mbes_horizontal")}  # groups: other faces, horizontal
 Member = tuple[GroupStatistics, Scatter]
 
 
@@ -36,20 +34,27 @@ def groups_table(adjustment: MountAdjustment) -> pd.DataFrame:
         row = _row(f"{sensor}:{family}", sensor, [member]) | {"family": family, "variance_factor": factor}
         if sensor in adjustment.rough:
             row["patch_m"] = adjustment.rough[sensor].patch_m[number]
-        if sensor == "mbes" and adjustment.ping is not None:
-            effects = adjustment.ping.effects
+        if sensor in adjustment.pings:
+            effects = adjustment.pings[sensor].effects
             row |= {"mean_effect": effects.of_mean[number], "slope_effect": effects.of_slope[number]}
         by_family.append(row)
-        together.setdefault((sensor, OF_KIND[sensor][surfaces[number].level]), []).append(member)
+        together.setdefault((sensor, _group_of(sensor, surfaces[number].level)), []).append(member)
     common = [
-        {"group": COMMON_ERROR[sensor], "sensor": sensor, "family": ""}
+        {"group": COMMON_ERROR.get(sensor, f"{sensor}_ping"), "sensor": sensor, "family": ""}
         | {"count": len(sums[sensor]), "variance_factor": found.factor, "scale": np.nan, "cut": 0, "reduced": 0}
         | {"sigma": found.sigma}
         for sensor, found in adjustment.epoch_factors.items()
     ]
     rows = [_row(name, sensor, members) for (sensor, name), members in together.items()]
-    rows.sort(key=lambda row: (row["sensor"], row["group"] == OF_KIND[row["sensor"]][1]))
+    rows.sort(key=lambda row: (row["sensor"], row["group"] == _group_of(row["sensor"], level=True)))
     return pd.DataFrame([*rows, *common, *by_family], columns=[column.name for column in GROUPS.columns])
+
+
+def _group_of(sensor: str, level: bool) -> str:
+    """Return the name of a sensor's rows of several families together: those of horizontal faces, or of the others."""
+    if sensor == "laser":
+        return "laser"
+    return f"{sensor}_horizontal" if level else f"{sensor}_vertical"
 
 
 def _row(name: str, sensor: str, members: Sequence[Member]) -> dict[str, Any]:
@@ -77,5 +82,5 @@ def sigma_check(adjustment: MountAdjustment) -> pd.DataFrame:
         return pd.DataFrame(columns=columns, dtype=np.float64)
     last = adjustment.last
     check = score_check(last.linearisation, last.drift, adjustment.drift_figures.noise, last.prior, solution.estimated)
-    names = [state.names[number] for number in solution.estimated if number < N_MOUNT]
+    names = [state.names[number] for number in solution.estimated if number in state.mounts]
     return pd.DataFrame(np.column_stack([check.ratio, check.dof]), index=names, columns=columns)

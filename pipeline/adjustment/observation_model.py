@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -21,13 +22,15 @@ from pipeline.maths.adjustment.design_matrix import (
 from pipeline.maths.adjustment.face_shifts import Faces
 from pipeline.maths.adjustment.interval_sums import N_MOVED, IntervalSums, LinearisedPoints, Runs, interval_sums
 from pipeline.maths.adjustment.normal_equations import RecordErrors, residual_shift
-from pipeline.maths.adjustment.parameters import LASER_FEATURES, MBES_FEATURES, ObservedSurface, State
+from pipeline.maths.adjustment.observed_surface import ObservedSurface
+from pipeline.maths.adjustment.parameters import LASER_FEATURES, MBES_FEATURES, State, kind_of
 from pipeline.maths.adjustment.pose_errors import N_POSE, DriftEstimate
 from pipeline.maths.adjustment.weighting import Weighting, common_variance
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-N_FEATURES = {"laser": N_MOVED + len(LASER_FEATURES), "mbes": N_MOVED + len(MBES_FEATURES) + 1}  # with the bow
+# by kind of sensor; the sonar's with the bow
+N_FEATURES = {"laser": N_MOVED + len(LASER_FEATURES), "mbes": N_MOVED + len(MBES_FEATURES) + 1}
 
 
 @dataclass(frozen=True)
@@ -161,8 +164,8 @@ class ObservationModel:
 
         Parameters
         ----------
-        sensor : {"laser", "mbes"}
-            The sensor that observed the points.
+        sensor : str
+            The sensor that observed the points: the laser, or a head of the sonar.
         batch : Batch
             Columns of labelled points.
         values : CurrentValues
@@ -171,14 +174,14 @@ class ObservationModel:
         state = values.state
         points, surface = self._ordered(batch)
         record, share = self.body.trajectory.interval_of(points["t_ns"])
-        n, n_features = len(surface), N_FEATURES[sensor]
+        n, n_features = len(surface), N_FEATURES[kind_of(sensor)]
         v, mean, sigma, common = np.empty((4, n))  # common: a variance
         features, slopes = np.empty((n_features, n)), np.empty((n_features - 1, n))
         by_pose = pose_design(state.surfaces, np.arange(len(state.surfaces)))
         errors = self.pose_errors(values.drift, np.unique(record))
         turns = errors.error[:, 3:].T
         shifts = residual_shift(state, sensor, self.body, errors, n_features)  # (r, s, F)
-        linearised = self._linearised_laser if sensor == "laser" else self._linearised_sonar
+        linearised = self._linearised_laser if sensor == "laser" else partial(self._linearised_sonar, sensor=sensor)
         bounds = np.searchsorted(surface, np.arange(len(state.surfaces) + 1)).tolist()
         for number, (start, stop) in enumerate(pairwise(bounds)):
             if start == stop:
@@ -212,11 +215,10 @@ class ObservationModel:
             slopes=slopes,
         )
 
-    def points_in_target(self, batch: Batch, state: State) -> Array:
-        """Return the calibrated sensor's points (n, 3) m in the target frame, with the mount of the state."""
-        points_m = point_array(batch, f"{state.calibrated}_m")
-        trajectory, mount = self.body.trajectory, (state.R_body_from_sensor, state.lever_arm_m)
-        return trajectory.points_from_sensor(batch["t_ns"], points_m, *mount)
+    def points_in_target(self, sensor: str, batch: Batch, state: State) -> Array:
+        """Return a calibrated sensor's points (n, 3) m in the target frame, with the mount of the state."""
+        points_m = point_array(batch, f"{kind_of(sensor)}_m")
+        return self.body.trajectory.points_from_sensor(batch["t_ns"], points_m, *state.mount_of(sensor))
 
     def _ordered(self, batch: Batch) -> tuple[Batch, Integers]:
         """Return the batch ordered by surface, and on each surface by time, with the numbers (n,) of the surfaces."""
@@ -240,7 +242,8 @@ class ObservationModel:
         step = axes @ trajectory.positions_m[record + 1].T - start
         lever_arm = axes @ (trajectory.R_frame_from_body[record] @ self.body.lever_arm("laser", state)).T
         is_calibrated = state.calibrated == "laser"
-        points = self.points_in_target(batch.points, state) if is_calibrated else point_array(batch.points, "target_m")
+        own = batch.points
+        points = self.points_in_target("laser", own, state) if is_calibrated else point_array(own, "target_m")
         along_axes = axes @ points.T
         r = along_axes - batch.intervals.spread(start) - batch.share * batch.intervals.spread(step)
         v = along_axes[2] - batch.surface.distance_m - self.height_of_face[batch.points["face"]]
@@ -248,14 +251,15 @@ class ObservationModel:
             r, v, laser_point_design(r, batch.intervals.spread(lever_arm), range_m, self.sigmas["laser"])
         )
 
-    def _linearised_sonar(self, batch: SurfaceBatch, state: State) -> LinearisedBatch:
+    def _linearised_sonar(self, batch: SurfaceBatch, state: State, sensor: str) -> LinearisedBatch:
+        R_body_from_mbes, lever_arm_m = state.mount_of(sensor)
         points_m, axes = point_array(batch.points, "mbes_m").T, batch.axes
         pings = Runs.of(batch.points["t_ns"])  # beams of a ping share their pose
         positions, R_target_from_body = self.body.trajectory.poses_at(batch.points["t_ns"][pings.starts])
-        R = R_target_from_body @ state.R_body_from_sensor
+        R = R_target_from_body @ R_body_from_mbes
         axes_mbes = pings.spread(np.einsum("kj,gji->kig", axes, R))
         up = pings.spread(R[:, 2, :].T)
-        lever_arm = pings.spread(axes @ (R_target_from_body @ state.lever_arm_m).T)
+        lever_arm = pings.spread(axes @ (R_target_from_body @ lever_arm_m).T)
         r = np.einsum("kin,in->kn", axes_mbes, points_m) + lever_arm
         v = r[2] + pings.spread(positions @ axes[2]) - batch.surface.distance_m
         v = v - self.height_of_face[batch.points["face"]]
@@ -269,4 +273,4 @@ class ObservationModel:
             height=(axes[:, 2] @ r + pings.spread(positions[:, 2]) - lowest_m) / (water_m - lowest_m),
             depth_m=water_m - lowest_m,
         )
-        return LinearisedBatch(r, v, sonar_point_design(soundings, self.sigmas["mbes"]))
+        return LinearisedBatch(r, v, sonar_point_design(soundings, self.sigmas[sensor]))

@@ -29,7 +29,7 @@ SETS = {  # by name: pattern of its parameters' names
     "wet_shifts": re.compile("wet_.+_shift"),
     "wet_turns": re.compile("wet_.+_turn_[12]"),
     "wet_bows": re.compile("wet_.+_bow"),
-    "mbes_detection": re.compile("mbes_incidence|mbes_level_range"),
+    "mbes_detection": re.compile("mbes(_[0-9]+)?_(incidence|level_range)"),
 }
 
 

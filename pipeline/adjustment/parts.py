@@ -21,10 +21,11 @@ from pipeline.adjustment.iteration import MountAdjustment
 from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.artefacts.catalogue.results import PARTS
 from pipeline.maths.adjustment.normal_equations import reduced_by_group
+from pipeline.maths.adjustment.parameters import kind_of
 from pipeline.maths.adjustment.parts import Deviation, deviation
-from pipeline.maths.adjustment.solution import solve
+from pipeline.maths.adjustment.solution import Solution, solve
 from pipeline.maths.geometry.passes import pass_of
-from pipeline.maths.mount_parameters import N_MOUNT, PARAMETERS
+from pipeline.maths.mount_parameters import PARAMETERS
 
 Integers = NDArray[np.int64]
 NO_WEIGHT = 1e12  # divisor of the weights of soundings that are left out
@@ -71,16 +72,15 @@ def parts_table(problem: CalibrationProblem, adjustment: MountAdjustment, passes
         Table passes.
     """
     whole = tuple(passes["pass"].tolist())
-    rows = [_row(part, difference) for part, difference in _deviations(problem, adjustment, passes)]
-    for family, difference in _without_faces(problem, adjustment):
-        rows.append(_row(Part(f"without the soundings on {family}", whole), difference))
+    rows = [_row(name, part, difference) for name, part, difference in _deviations(problem, adjustment, passes)]
+    rows += [_row(name, Part(name, whole), difference) for name, difference in _without_faces(problem, adjustment)]
     return pd.DataFrame(rows, columns=[column.name for column in PARTS.columns])
 
 
 def _deviations(
     problem: CalibrationProblem, adjustment: MountAdjustment, passes: pd.DataFrame
-) -> Iterator[tuple[Part, Deviation]]:
-    """Yield the deviation of each part that determines all parameters."""
+) -> Iterator[tuple[str, Part, Deviation]]:
+    """Yield the deviations of each part that determines all parameters: of each head's mount, with a name."""
     whole = adjustment.solution
     if whole.deficiency:
         return
@@ -99,23 +99,38 @@ def _deviations(
         equations = last.equations(noise, reduced=reduced.of(groups))
         solution = solve(equations.normal, equations.right, whole.estimated.tolist())
         if not solution.deficiency:
-            yield part, deviation(solution, whole, problem.consider, np.arange(N_MOUNT))
+            for name, difference in _of_heads(part.name, problem, adjustment, solution):
+                yield name, part, difference
+
+
+def _of_heads(
+    part: str, problem: CalibrationProblem, adjustment: MountAdjustment, solution: Solution
+) -> Iterator[tuple[str, Deviation]]:
+    """Yield the deviation of each head's mount in a part's solution, with a name."""
+    state, whole = adjustment.state, adjustment.solution
+    for head in state.heads:
+        name = part if head == state.calibrated else f"{part} ({head})"
+        yield name, deviation(solution, whole, problem.consider, state.mount_columns(head))
 
 
 def _without_faces(problem: CalibrationProblem, adjustment: MountAdjustment) -> Iterator[tuple[str, Deviation]]:
-    """Yield the deviation without the soundings on each surface, where nobody has surveyed the walls."""
+    """Yield the deviations without the soundings on each surface, where nobody has surveyed the walls."""
     whole, last, noise = adjustment.solution, adjustment.last, adjustment.drift_figures.noise
-    if whole.deficiency or not problem.prior.from_start or "mbes" not in last.linearisation.sums:
+    heads = {head: sums for head, sums in last.linearisation.sums.items() if kind_of(head) == "mbes"}
+    if whole.deficiency or not problem.prior.from_start or not heads:
         return
-    soundings, surfaces = last.linearisation.sums["mbes"], adjustment.state.surfaces
-    seen = np.unique(soundings.surface).tolist()
+    surfaces = adjustment.state.surfaces
+    seen = np.unique(np.concatenate([soundings.surface for soundings in heads.values()])).tolist()
     for number in seen if len(seen) > 1 else ():
-        divisors = np.where(np.arange(len(surfaces)) == number, NO_WEIGHT, 1.0)
-        left = last.linearisation.with_sums("mbes", soundings.changed(partial(by_divisors, divisors=divisors)))
+        change = partial(by_divisors, divisors=np.where(np.arange(len(surfaces)) == number, NO_WEIGHT, 1.0))
+        left = last.linearisation
+        for head, soundings in heads.items():
+            left = left.with_sums(head, soundings.changed(change))
         equations = replace(last, linearisation=left).equations(noise)
         solution = solve(equations.normal, equations.right, whole.estimated.tolist())
         if not solution.deficiency:
-            yield surfaces[number].family, deviation(solution, whole, problem.consider, np.arange(N_MOUNT))
+            part = f"without the soundings on {surfaces[number].family}"
+            yield from _of_heads(part, problem, adjustment, solution)
 
 
 def _passes_of(record: Integers, pass_of_record: Integers) -> Integers:
@@ -124,11 +139,11 @@ def _passes_of(record: Integers, pass_of_record: Integers) -> Integers:
     return np.where(before >= 0, before, after)
 
 
-def _row(part: Part, difference: Deviation) -> dict[str, Any]:
-    row: dict[str, Any] = {"part": part.name, "passes": " ".join(map(str, part.passes))}
+def _row(name: str, part: Part, difference: Deviation) -> dict[str, Any]:
+    row: dict[str, Any] = {"part": name, "passes": " ".join(map(str, part.passes))}
     row |= {"normalised": difference.normalised, "dof": difference.dof}
-    for name, number, _, unit in PARAMETERS:
+    for parameter, number, _, unit in PARAMETERS:
         scale = float(np.degrees(1.0)) if unit == "deg" else 1.0
         for kind, values in (("change", difference.change), ("sigma", difference.sigma)):
-            row[f"{kind}_{name}"] = scale * float(values[number])
+            row[f"{kind}_{parameter}"] = scale * float(values[number])
     return row

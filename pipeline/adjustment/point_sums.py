@@ -14,7 +14,7 @@ from pipeline.adjustment.observation_model import N_FEATURES, CurrentValues, Obs
 from pipeline.artefacts.streams import Batch
 from pipeline.maths.adjustment.interval_sums import N_MOVED, IntervalSums, Runs
 from pipeline.maths.adjustment.normal_equations import residual_shift
-from pipeline.maths.adjustment.parameters import State
+from pipeline.maths.adjustment.parameters import State, kind_of
 from pipeline.maths.adjustment.robust_weights import BINS
 from pipeline.maths.adjustment.weighting import Weighting
 from pipeline.maths.kernels.interval_group import (
@@ -33,7 +33,7 @@ from pipeline.maths.kernels.sounding_sums import SonarPoses, sum_soundings
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-COLUMNS = {  # of the labelled points that the sums need, by sensor
+COLUMNS = {  # of the labelled points that the sums need, by kind of sensor
     "laser": ("t_ns", "face", *(f"{axis}_{frame}_m" for frame in ("laser", "target") for axis in "xyz"), "edge_weight"),
     "mbes": ("t_ns", "face", *(f"{axis}_mbes_m" for axis in "xyz"), "edge_weight"),
 }
@@ -87,15 +87,15 @@ def summed(
         Columns of n labelled points.
     model : ObservationModel
         Model that turns points into observations.
-    sensor : {"laser", "mbes"}
-        The sensor that observed the points.
+    sensor : str
+        The sensor that observed the points: the laser, or a head of the sonar.
     values : CurrentValues
         Parameters, drift and weights at which to linearise.
     residuals : bool
         Whether to return the residual of each point, and the sums of each interval and face, with the number of the
         face in place of that of its surface.
     """
-    points, state, features = _in_order_of_time(batch), values.state, N_FEATURES[sensor]
+    points, state, features = _in_order_of_time(batch), values.state, N_FEATURES[kind_of(sensor)]
     surface = model.faces.surface[points["face"]].astype(np.int64)
     surfaces = len(state.surfaces)
     apart = points["face"].astype(np.int64) if residuals else surface
@@ -125,7 +125,8 @@ def summed(
         poses = _laser_poses(points, model, state, errors.record)
         sum_laser_points(of_points, poses, of_records, of_surfaces, noise, sums, memory)
     else:
-        sum_soundings(of_points, _sonar_poses(points, model, state), of_records, of_surfaces, noise, sums, memory)
+        pings = _sonar_poses(points, model, state, sensor)
+        sum_soundings(of_points, pings, of_records, of_surfaces, noise, sums, memory)
     return SummedBatch(
         sums=_interval_sums(slots, sums),
         statistics=sums.statistics,
@@ -140,7 +141,7 @@ def summed(
 def _laser_places(points: Batch, model: ObservationModel, state: State) -> Array:
     """Return the laser's points (3, n) in the target frame; with the mount of the state if it is calibrated."""
     if state.calibrated == "laser":
-        return _line(model.points_in_target(points, state).T)
+        return _line(model.points_in_target("laser", points, state).T)
     return _axes(points, "target_m")
 
 
@@ -153,14 +154,15 @@ def _laser_poses(points: Batch, model: ObservationModel, state: State, record: I
     )
 
 
-def _sonar_poses(points: Batch, model: ObservationModel, state: State) -> SonarPoses:
+def _sonar_poses(points: Batch, model: ObservationModel, state: State, sensor: str) -> SonarPoses:
+    R_body_from_mbes, lever_arm_m = state.mount_of(sensor)
     pings = Runs.of(points["t_ns"])  # beams of a ping share their pose
     positions, R_target_from_body = model.body.trajectory.poses_at(points["t_ns"][pings.starts])
     return SonarPoses(
         ping=np.repeat(np.arange(len(pings.starts)), pings.lengths),
         position_m=_line(positions),
-        R_target_from_mbes=_line(R_target_from_body @ state.R_body_from_sensor),
-        lever_arm_m=_line(R_target_from_body @ state.lever_arm_m),
+        R_target_from_mbes=_line(R_target_from_body @ R_body_from_mbes),
+        lever_arm_m=_line(R_target_from_body @ lever_arm_m),
         wet_m=np.array(model.wet_heights_m, dtype=np.float64),
     )
 

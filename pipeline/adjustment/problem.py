@@ -5,6 +5,7 @@ This module makes the sonar's problem; :mod:`pipeline.adjustment.laser_design` m
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Protocol
 
 import numpy as np
@@ -19,7 +20,8 @@ from pipeline.maths.adjustment.body_motion import BodyMotion
 from pipeline.maths.adjustment.design_matrix import SensorSigmas
 from pipeline.maths.adjustment.drift_likelihood import EXACT, DriftPrior
 from pipeline.maths.adjustment.face_shifts import Faces
-from pipeline.maths.adjustment.parameters import ObservedSurface, State
+from pipeline.maths.adjustment.observed_surface import ObservedSurface
+from pipeline.maths.adjustment.parameters import FurtherHead, State
 from pipeline.maths.adjustment.pose_errors import PoseNoise
 from pipeline.maths.adjustment.pseudo_observations import ParallelPrior, ParameterPrior, Prior
 from pipeline.maths.adjustment.solution import ConsiderErrors
@@ -30,6 +32,7 @@ from pipeline.mount import Mounted
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
+NO_HEADS: Mapping[str, Mounted] = MappingProxyType({})
 LEAST_PARALLEL_RAD = 1e-7  # smallest sigma of the angle between parallel families
 
 
@@ -121,7 +124,9 @@ class SessionData:
     mapper: Mapper = serial
 
 
-def sonar_problem(session: SessionData, mount: Mounted, noise: Mapping[str, PointNoise]) -> CalibrationProblem:
+def sonar_problem(
+    session: SessionData, mount: Mounted, noise: Mapping[str, PointNoise], further: Mapping[str, Mounted] = NO_HEADS
+) -> CalibrationProblem:
     """Return the problem of calibrating the sonar against the surfaces that the laser sees from the same body.
 
     No fixed parameter has an error yet (:func:`pipeline.adjustment.consider.sonar_errors` returns these errors).
@@ -131,11 +136,14 @@ def sonar_problem(session: SessionData, mount: Mounted, noise: Mapping[str, Poin
     session : SessionData
         Poses, target and surfaces.
     mount : Mounted
-        The sonar's mount, at which the adjustment starts.
+        The sonar's mount, at which the adjustment starts; of several heads that of the first.
     noise : mapping of PointNoise
-        Settings of laser and sonar.
+        Settings of the laser and of all heads.
+    further : mapping of Mounted
+        The mounts of the other heads, by name.
     """
-    state = State.at(mount.R_body_from_sensor, mount.lever_arm_body_m, session.surfaces, "mbes")
+    others = [FurtherHead(name, at.R_body_from_sensor, at.lever_arm_body_m) for name, at in further.items()]
+    state = State.at(mount.R_body_from_sensor, mount.lever_arm_body_m, session.surfaces, "mbes", others)
     parallel = _parallel_families(session.target, session.as_built)
     prior = PriorInformation(session.noise, parallel, drift=session.drift)
     return problem_at(session, state, prior, noise)

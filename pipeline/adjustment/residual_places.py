@@ -11,7 +11,7 @@ from pipeline.adjustment.observation_model import ObservationModel
 from pipeline.adjustment.point_sums import SummedBatch
 from pipeline.artefacts.streams import point_array
 from pipeline.maths.adjustment.design_matrix import FLATTEST
-from pipeline.maths.adjustment.parameters import State
+from pipeline.maths.adjustment.parameters import State, kind_of
 
 Array = NDArray[np.float64]
 
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 def ranges_on_surface(sensor: str, observed: SummedBatch) -> tuple[Array, Array]:
     """Return the measured ranges (n,) m, and those to the surface; ``observed`` has residuals."""
     v_m, cosine = observed.observed[0], observed.observed[-1]
-    own = point_array(observed.points, f"{sensor}_m")
+    own = point_array(observed.points, f"{kind_of(sensor)}_m")
     range_m = np.sqrt(own[:, 0] ** 2 + own[:, 1] ** 2 + own[:, 2] ** 2)
     return range_m, range_m - v_m / np.copysign(np.maximum(np.abs(cosine), FLATTEST), cosine)
 
@@ -31,7 +31,8 @@ def heights_on_surface(model: ObservationModel, sensor: str, observed: SummedBat
     """
     range_m, reached_m = ranges_on_surface(sensor, observed)
     points, body, record = observed.points, model.body, observed.record
-    measured = model.points_in_target(points, state)[:, 2] if sensor == state.calibrated else points["z_target_m"]
+    is_calibrated = sensor in state.heads
+    measured = model.points_in_target(sensor, points, state)[:, 2] if is_calibrated else points["z_target_m"]
     lever_arm = body.lever_arm(sensor, state)
     used = slice(int(record.min(initial=0)), int(record.max(initial=0)) + 2)
     at_records = body.trajectory.positions_m[used, 2] + body.trajectory.R_frame_from_body[used, 2] @ lever_arm

@@ -23,7 +23,7 @@ from pipeline.config.pool import Adjust
 from pipeline.gps_time import NS
 from pipeline.maths.adjustment.interval_sums import Intervals, IntervalSums
 from pipeline.maths.adjustment.mean_tests import normal_deviates
-from pipeline.maths.adjustment.parameters import State
+from pipeline.maths.adjustment.parameters import State, kind_of
 from pipeline.maths.adjustment.pose_errors import drift_between_passes
 from pipeline.maths.adjustment.profiles import FEWEST_BINS, PATCHES, off_line, profile_of, roughness_allowance
 from pipeline.maths.adjustment.residual_means import (
@@ -114,7 +114,7 @@ def residual_statistics(
         pieces: dict[str, list[ResidualSums]] = {}
         read = stream.fold(_batch, problem.model, sensor, adjustment.values, thinning)
         by_face = _kept(read, pieces, samples)
-        sums_by_face[sensor] = StoredSums.of(by_face, N_FEATURES[sensor])
+        sums_by_face[sensor] = StoredSums.of(by_face, N_FEATURES[kind_of(sensor)])
         give_back_memory()
         of_surface, of_face = _allowances(problem, adjustment, sensor, pieces.get("height", []))
         for variable, parts in pieces.items():
@@ -215,7 +215,7 @@ def _variables(
     A step at a height tells what disturbs a sensor near the water, or where a face ends. Each face is compared with
     itself, because faces end at different heights. On a level face the height is that of the drift; it has no test.
     """
-    batch, own = observed.points, point_array(observed.points, f"{sensor}_m")
+    batch, own = observed.points, point_array(observed.points, f"{kind_of(sensor)}_m")
     range_m, reached_m = ranges_on_surface(sensor, observed)
     angle = np.degrees(np.arcsin(own[:, 2] / range_m) if sensor == "laser" else receive_angle(own))
     yield "pass", batch["pass"].astype(np.int64)
@@ -224,7 +224,7 @@ def _variables(
     yield "distance", reached_m
     yield "height", heights_on_surface(model, sensor, observed, state)
     yield "time", batch["t_ns"] // NS
-    if sensor == "mbes":
+    if kind_of(sensor) == "mbes":
         yield "step", angle
         for name, pings in CYCLES.items():
             yield name, batch["ping"] % pings

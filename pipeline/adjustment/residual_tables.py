@@ -14,12 +14,11 @@ from pipeline.artefacts.columns import ALL_PASSES
 from pipeline.artefacts.from_tables import normal_of
 from pipeline.artefacts.streams import Batch, point_array
 from pipeline.gps_time import NS
-from pipeline.maths.adjustment.parameters import State
+from pipeline.maths.adjustment.parameters import State, kind_of
 from pipeline.maths.geometry.face_grid import BinStatistics, bin_statistics, cell_centres, cells_on_face
 from pipeline.maths.sonar.soundings import receive_angle
 
 Array = NDArray[np.float64]
-SENSORS = ("laser", "mbes")
 WIDTHS = {"angle": 2.0, "range": 0.5, "time": 1.0}  # of bins: degrees, m, s
 CELL_M = 0.1
 FEWEST = 10  # points: the report shows no mean of fewer
@@ -31,7 +30,7 @@ def bins_table(residuals: pd.DataFrame, faces: pd.DataFrame) -> pd.DataFrame:
     families = sorted(set(faces["family"]))
     family = _family_number(residuals, faces, families)
     rows: list[pd.DataFrame] = []
-    for sensor in SENSORS:
+    for sensor in _sensors(residuals):
         use = (residuals["sensor"] == sensor).to_numpy()
         points = residuals[use]
         everywhere = np.full(len(points), ALL_PASSES)
@@ -61,7 +60,7 @@ def bins_table(residuals: pd.DataFrame, faces: pd.DataFrame) -> pd.DataFrame:
 def map_table(residuals: pd.DataFrame, faces: pd.DataFrame) -> pd.DataFrame:
     """Return the table ``residual_map``: the mean residual of each sensor in each grid cell of each face."""
     rows: list[dict[str, Any]] = []
-    for sensor in SENSORS:
+    for sensor in _sensors(residuals):
         of_sensor = residuals[residuals["sensor"] == sensor]
         positions = of_sensor[[f"{axis}_target_m" for axis in "xyz"]].to_numpy(np.float64)
         residual_m, weight = (of_sensor[name].to_numpy(np.float64) for name in ("residual_m", "weight"))
@@ -78,6 +77,11 @@ def map_table(residuals: pd.DataFrame, faces: pd.DataFrame) -> pd.DataFrame:
             rows.append({"sensor": np.full(len(centres), sensor, dtype=object), "face": number, **centre_columns})
             rows[-1] |= {"size_m": np.full(len(centres), CELL_M), **_columns(bins)}
     return pd.DataFrame({name: np.concatenate([row[name] for row in rows]) for name in rows[0]})
+
+
+def _sensors(residuals: pd.DataFrame) -> list[str]:
+    """Return the names of the sensors: the laser, the first head of the sonar, and further heads that have points."""
+    return sorted({"laser", "mbes", *residuals["sensor"].unique()})
 
 
 def _binned(points: pd.DataFrame, *keys: Any) -> BinStatistics:
@@ -107,8 +111,8 @@ def residual_sample(model: ObservationModel, sensor: str, observed: SummedBatch,
     ----------
     model : ObservationModel
         Model that turns points into observations.
-    sensor : {"laser", "mbes"}
-        The sensor that observed the points.
+    sensor : str
+        The sensor that observed the points: the laser, or a head of the sonar.
     observed : SummedBatch
         Labelled points with their residuals.
     state : State
@@ -118,14 +122,14 @@ def residual_sample(model: ObservationModel, sensor: str, observed: SummedBatch,
     """
     points = {name: column[::step].copy() for name, column in observed.points.items()}  # views would keep all
     v_m, mean_m, robust, *_ = observed.observed[:, ::step]
-    own = point_array(points, f"{sensor}_m")
+    own = point_array(points, f"{kind_of(sensor)}_m")
     ranges = np.linalg.norm(own, axis=1)
-    angle = receive_angle(own) if sensor == "mbes" else np.arcsin(own[:, 2] / ranges)
-    if sensor != state.calibrated:
+    angle = receive_angle(own) if kind_of(sensor) == "mbes" else np.arcsin(own[:, 2] / ranges)
+    if sensor not in state.heads:
         positions = coarse_positions = point_array(points, "target_m")
         coarse_residual = v_m
     else:
-        positions, coarse_positions = (model.points_in_target(points, at) for at in (state, model.coarse))
+        positions, coarse_positions = (model.points_in_target(sensor, points, at) for at in (state, model.coarse))
         coarse_residual = _distances(model, points["face"], coarse_positions, state)
     columns = {f"{axis}_target_m": positions[:, k] for k, axis in enumerate("xyz")}
     columns |= {f"coarse_{axis}_target_m": coarse_positions[:, k] for k, axis in enumerate("xyz")}

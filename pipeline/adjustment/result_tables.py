@@ -15,16 +15,18 @@ from pipeline.adjustment.parameter_strengths import SetTest, parameter_tests, se
 from pipeline.adjustment.pattern_tests import passes_test
 from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.adjustment.residual_statistics import ResidualStatistics
-from pipeline.artefacts.catalogue.results import CELLS, SETS
+from pipeline.artefacts.catalogue.results import CELLS, HEAD_EFFECTS, SETS
 from pipeline.artefacts.to_tables import normal_columns
 from pipeline.console import plural
 from pipeline.maths.adjustment.parameter_tests import ParameterTest
+from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.solution import Solution, weakest_direction
 from pipeline.maths.adjustment.weighting import scatter
 from pipeline.maths.geometry.passes import pass_of
 from pipeline.maths.mount_parameters import MOUNT_NAMES, N_MOUNT
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 
 def result_tables(
@@ -56,8 +58,9 @@ def result_tables(
     by_session = strengths_by_session(problem, adjustment, statistics.sums_by_face, final)
     return {
         "estimate": estimate.join(sigma_check(adjustment), on="unknown"),
-        "covariance": _covariance_table(random[:N_MOUNT, :N_MOUNT], total[:N_MOUNT, :N_MOUNT]),
-        "freed": _single_parameter_table(problem, final, estimate, tests, by_session),
+        "covariance": _covariance_table(final, adjustment.state.mounts, random, total),
+        "freed": _single_parameter_table(problem, final, estimate, tests, by_session, np.arange(N_MOUNT)),
+        **_head_effects(problem, final, estimate, tests),
         "sets": _set_table(set_tests(final, tests), by_session),
         "groups": groups_table(adjustment),
         "summary": _summary_table(adjustment, passes_test(statistics.patterns, test_level)),
@@ -71,7 +74,7 @@ def result_tables(
 def _estimate(problem: CalibrationProblem, final: FinalSolution) -> tuple[pd.DataFrame, Array, Array]:
     """Return the table of mount and estimated parameters, and their random and total covariance.
 
-    If the data leave a direction open, the mount's values and both covariances are NaN.
+    If the data leave a direction open, the mounts' values and both covariances are NaN.
     """
     solution = final.solution
     numbers = solution.estimated
@@ -79,7 +82,8 @@ def _estimate(problem: CalibrationProblem, final: FinalSolution) -> tuple[pd.Dat
     total = solution.total_covariance(problem.consider, numbers)
     values = final.deviation[numbers]
     if solution.deficiency:
-        values[:N_MOUNT], random, total = np.nan, np.full_like(random, np.nan), np.full_like(total, np.nan)
+        values[np.isin(numbers, problem.model.coarse.mounts)] = np.nan
+        random, total = np.full_like(random, np.nan), np.full_like(total, np.nan)
     table = pd.DataFrame(
         {
             "unknown": [final.names[k] for k in numbers],
@@ -103,7 +107,7 @@ def _summary_table(adjustment: MountAdjustment, test: Mapping[str, Any]) -> pd.D
         "between_dof": between.dof,
         "condition": solution.condition,
         "rank_deficiency": solution.deficiency,
-        "weakest": "" if solution.deficiency else weakest_direction(solution.covariance[:N_MOUNT, :N_MOUNT]),
+        "weakest": "" if solution.deficiency else _weakest(adjustment.state, solution),
         **_rival(adjustment),
         **{f"test_{name}": test[name] for name in ("statistic", "dof", "limit", "passed")},
         "reason": _no_result(solution.deficiency) if solution.deficiency else "",
@@ -126,15 +130,28 @@ def _no_result(deficiency: int) -> str:
     return f"the data leave {plural(deficiency, 'direction')} of the unknowns open"
 
 
-def _covariance_table(random: Array, total: Array) -> pd.DataFrame:
+def _weakest(state: State, solution: Solution) -> str:
+    """Return in words which mount parameters are hardest to tell apart; with several heads, of each head."""
+    words = []
+    for head in state.heads:
+        places = np.searchsorted(solution.estimated, state.mount_columns(head))
+        of_head = weakest_direction(solution.covariance[np.ix_(places, places)])
+        words.append(of_head if head == state.calibrated else f"{head}: {of_head}")
+    return "; ".join(words)
+
+
+def _covariance_table(final: FinalSolution, mounts: Integers, random: Array, total: Array) -> pd.DataFrame:
+    """Return the table of the covariance of all mounts, from the covariances of the estimated parameters."""
+    places, names = np.searchsorted(final.solution.estimated, mounts), [final.names[k] for k in mounts]
+    random, total = random[np.ix_(places, places)], total[np.ix_(places, places)]
     sigma = np.sqrt(np.diag(random))
     product = np.outer(sigma, sigma)
-    unknown = np.where(np.isnan(product), np.nan, np.eye(N_MOUNT))
+    unknown = np.where(np.isnan(product), np.nan, np.eye(len(mounts)))
     correlation = np.divide(random, product, out=unknown, where=product > 0)
     return pd.DataFrame(
         {
-            "row": np.repeat(MOUNT_NAMES, N_MOUNT),
-            "column": np.tile(MOUNT_NAMES, N_MOUNT),
+            "row": np.repeat(names, len(names)),
+            "column": np.tile(names, len(names)),
             "covariance": random.ravel(),
             "correlation": correlation.ravel(),
             "covariance_total": total.ravel(),
@@ -148,22 +165,24 @@ def _single_parameter_table(
     estimate: pd.DataFrame,
     tests: Sequence[ParameterTest],
     by_session: Mapping[str, float],
+    mount: Integers,
 ) -> pd.DataFrame:
-    """Return table ``freed``: the test of each additional parameter, and the effect of its error on the mount.
+    """Return table ``freed``: the test of each additional parameter, and the effect of its error on a mount.
 
     The parameters are fixed, or estimated with a value known beforehand (those of a laser's coarse mount among them),
     or named in adjust.free. Where values known beforehand correlate, the effects are of independent errors instead,
-    whose squares have the same sum.
+    whose squares have the same sum. ``mount`` (6,): places of the mount's parameters.
     """
     solution, consider = final.solution, problem.consider
-    mount, known = np.arange(N_MOUNT), problem.prior.known_parameters
+    known = problem.prior.known_parameters
     by_number = {test.parameter: test for test in tests}
     effects = np.zeros((N_MOUNT, len(final.names)))
     effects[:, solution.fixed] = solution.sensitivity_of(mount) * consider.sigmas[solution.fixed]
     effects[:, known] = solution.prior_effects(mount, known)
     by_name, rows = estimate.set_index("unknown"), []
-    surfaces = problem.model.coarse.surface_slice
-    freed = np.setdiff1d(solution.estimated, [*mount, *range(surfaces.start, surfaces.stop), *known]).tolist()
+    coarse, surfaces = problem.model.coarse, problem.model.coarse.surface_slice
+    of_state = [*coarse.mounts, *range(surfaces.start, surfaces.stop)]
+    freed = np.setdiff1d(solution.estimated, [*of_state, *known]).tolist()
     for number in [*sorted([*solution.fixed.tolist(), *known.tolist()]), *freed]:
         name, considered = final.names[number], consider.sigmas[number]
         test = by_number.get(number, ParameterTest(number, np.nan, np.nan, np.nan, np.nan))
@@ -175,15 +194,28 @@ def _single_parameter_table(
         row |= {"value": test.value, "sigma": test.sigma, "expected": test.expected}
         row |= {"strength": test.strength, "by_session": by_session.get(name, np.nan)}
         rows.append(row | {f"effect_{axis}": effects[k, number] for k, axis in enumerate(MOUNT_NAMES)})
-    return pd.DataFrame([*rows, *_surface_rows(final.solution, surfaces)])
+    return pd.DataFrame([*rows, *_surface_rows(final.solution, surfaces, mount)])
 
 
-def _surface_rows(solution: Solution, surfaces: slice) -> list[dict[str, Any]]:
+def _head_effects(
+    problem: CalibrationProblem, final: FinalSolution, estimate: pd.DataFrame, tests: Sequence[ParameterTest]
+) -> dict[str, pd.DataFrame]:
+    """Return by name table ``head_effects``: what errors do to the mounts of further heads; nothing of one head."""
+    coarse = problem.model.coarse
+    tables = [
+        _single_parameter_table(problem, final, estimate, tests, {}, coarse.mount_columns(head)).assign(head=head)
+        for head in coarse.heads[1:]
+    ]
+    names = [column.name for column in HEAD_EFFECTS.columns]
+    return {"head_effects": pd.concat(tables, ignore_index=True)[names]} if tables else {}
+
+
+def _surface_rows(solution: Solution, surfaces: slice, mount: Integers) -> list[dict[str, Any]]:
     """Return rows of table ``freed`` with the effects of errors in what is known of the surfaces beforehand."""
     group = np.arange(surfaces.start, surfaces.stop)
-    if solution.deficiency or not np.all(np.isin([*range(N_MOUNT), *group], solution.estimated)):
+    if solution.deficiency or not np.all(np.isin([*mount, *group], solution.estimated)):
         return []
-    effects = solution.group_effects(np.arange(N_MOUNT), group)
+    effects = solution.group_effects(mount, group)
     if not np.any(effects):
         return []
     none = {"estimated": False, "known": False, "considered": 1.0}
@@ -215,8 +247,8 @@ def _surfaces_table(adjustment: MountAdjustment, statistics: ResidualStatistics)
     for k, surface in enumerate(adjustment.state.surfaces):
         row = normal_columns(surface.normal)
         row |= {"family": surface.family, "distance_m": surface.distance_m}
-        for sensor, column in (("laser", "laser_points"), ("mbes", "soundings")):
-            row[column] = statistics.count(sensor, k)
+        row["laser_points"] = statistics.count("laser", k)
+        row["soundings"] = sum(statistics.count(head, k) for head in ("mbes", *adjustment.state.heads[1:]))
         rows.append(row)
     return pd.DataFrame(rows)
 

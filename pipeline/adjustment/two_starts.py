@@ -59,7 +59,8 @@ def chosen_iteration(
 ) -> ChosenIteration:
     """Return the iteration with the smaller sum of squares; parameters as for :func:`weighted_iteration`."""
     first = weighted_iteration(problem, streams, settings, gap_s)
-    may_differ = problem.prior.from_start and "mbes" in streams and not first.deficient
+    one_head = len(problem.model.coarse.heads) == 1 and "mbes" in streams  # two heads see the walls from two sides
+    may_differ = problem.prior.from_start and one_head and not first.deficient
     mirrored = None if not may_differ else mirrored_mount(first.last.linearisation)
     if mirrored is None:
         return ChosenIteration(first)

@@ -21,7 +21,7 @@ from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.adjustment.residual_places import heights_on_surface
 from pipeline.artefacts.streams import Batch, Stream, point_array
 from pipeline.gps_time import NS
-from pipeline.maths.adjustment.parameters import State
+from pipeline.maths.adjustment.parameters import State, kind_of
 from pipeline.maths.adjustment.profiles import FEWEST_BINS, off_line, profile_of, roughness_allowance
 from pipeline.maths.adjustment.residual_means import (
     BinMean,
@@ -94,8 +94,8 @@ class OutsideStripes:
     def _heights_m(self, points: Batch) -> Array:
         """Return the heights (n,) above the water at which the points' rays meet their surfaces, as in profiles."""
         model, state = self.model, self.state
-        calibrated = self.sensor == state.calibrated
-        placed = model.points_in_target(points, state) if calibrated else point_array(points, "target_m")
+        calibrated = self.sensor in state.heads
+        placed = model.points_in_target(self.sensor, points, state) if calibrated else point_array(points, "target_m")
         ray = placed - model.body.trajectory.track_of_point(points["t_ns"], model.body.lever_arm(self.sensor, state))
         number = model.faces.surface[points["face"]]
         normal = np.array([surface.normal for surface in state.surfaces])[number]
@@ -155,7 +155,7 @@ def stripes_off(
             if len(means) < FEWEST_BINS or state.surfaces[surface].level:
                 continue
             smooth = tolerance_m, float(adjustment.rough[sensor].patch_m[surface])
-            bow_m = bows.get(f"wet_{state.surfaces[surface].family}_bow", 0.0) if sensor == "mbes" else 0.0
+            bow_m = bows.get(f"wet_{state.surfaces[surface].family}_bow", 0.0) if kind_of(sensor) == "mbes" else 0.0
             found += stripes_of_face((sensor, face), means, smooth, (bow_m, water_m - lowest_m))
     return found
 

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.adjustment.accumulation import Accumulation, accumulate, reweighted
-from pipeline.adjustment.initial_mount import initial_mount
+from pipeline.adjustment.initial_mount import initial_mounts
 from pipeline.adjustment.iterate import Iterate
 from pipeline.adjustment.observation_model import CurrentValues
 from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.artefacts.streams import Stream
 from pipeline.maths.adjustment.normal_equations import Linearisation
-from pipeline.maths.adjustment.parameters import State
+from pipeline.maths.adjustment.parameters import State, of_head
 from pipeline.maths.adjustment.solution import Solution
 from pipeline.maths.adjustment.weighting import Weighting, noise_seen_by_laser
 from pipeline.maths.mount_parameters import N_MOUNT
@@ -61,9 +61,13 @@ LEAST_PASSES = 3  # readings of the points: for the drift, for outliers beside i
 
 
 def estimated_columns(state: State, additional: Sequence[str] = (), mount: bool = True) -> list[int]:
-    """Return the numbers of the parameters to estimate: mount, surfaces, and the ones named in ``additional``."""
+    """Return the numbers of the parameters to estimate: mounts, surfaces, and the ones named in ``additional``.
+
+    A parameter of the first head names those of all heads.
+    """
     surfaces = range(state.surface_slice.start, state.surface_slice.stop)
-    return sorted({*range(N_MOUNT if mount else 0), *surfaces, *(state.names.index(name) for name in additional)})
+    further = (number for number, name in enumerate(state.names) if of_head(name)[1] in additional)
+    return sorted({*(state.mounts if mount else ()), *surfaces, *further})
 
 
 @dataclass(frozen=True)
@@ -104,12 +108,11 @@ def weighted_iteration(
         Where to start; by default, the coarse mount brought near the surfaces.
     """
     model, prior = problem.model, problem.prior
-    state = begin
-    if state is None:
-        state = initial_mount(streams["mbes"], model) if "mbes" in streams else model.coarse
+    state = initial_mounts(streams, model) if begin is None else begin
     values = CurrentValues(state, weighting=Weighting(white=prior.noise.white))
     estimated = np.array(estimated_columns(state, settings.free, mount=state.calibrated in streams))
     estimated = np.union1d(estimated, prior.known_parameters) if prior.from_start else estimated
+    mounts = np.flatnonzero(np.isin(estimated, state.mounts))
     iteration = 0
     while True:
         iteration += 1
@@ -121,7 +124,7 @@ def weighted_iteration(
         # solve and step
         stepped, solution = start.stepped(replace(prior.noise, white=weighting.white), estimated)
         deficient = solution.deficiency > 0
-        settled = weighting.robust is not None and is_small(solution, SETTLED)
+        settled = weighting.robust is not None and is_small(solution, SETTLED, mounts)
         if deficient or (settled and iteration >= LEAST_PASSES) or iteration >= settings.max_iterations:
             return WeightedIteration(
                 last=start if deficient else stepped,
@@ -141,13 +144,19 @@ def weighted_iteration(
         del accumulation, linearisation, start, stepped  # the next reading needs their memory
 
 
-def is_small(solution: Solution, limits: StepLimits) -> bool:
-    """Return whether the step of each estimated mount parameter is within the limits; without these, of each surface's.
+def is_small(solution: Solution, limits: StepLimits, mounts: Integers) -> bool:
+    """Return whether the step of each estimated mount parameter is within the limits.
 
-    The turns and shifts of surfaces, rad and m, have the limit of rotations.
+    Parameters
+    ----------
+    solution : Solution
+        Solution of the estimated parameters alone.
+    limits : StepLimits
+        Bounds of the steps.
+    mounts : (6 h,) array
+        Places of the h mounts among its parameters. Without any the first six count, which are those of surfaces.
     """
-    estimated = solution.estimated
-    judged = estimated < N_MOUNT if np.any(estimated < N_MOUNT) else np.ones(len(estimated), dtype=bool)
+    judged = mounts if len(mounts) else np.arange(min(N_MOUNT, len(solution.estimated)))
     sigma = np.sqrt(np.diag(solution.covariance))[judged]
-    absolute = np.where((estimated >= 3) & (estimated < N_MOUNT), limits.m, limits.rad)[judged]
-    return bool(np.all(np.abs(solution.step[estimated][judged]) <= np.maximum(limits.sigmas * sigma, absolute)))
+    absolute = np.where(np.arange(len(judged)) % N_MOUNT < 3, limits.rad, limits.m)
+    return bool(np.all(np.abs(solution.step[judged]) <= np.maximum(limits.sigmas * sigma, absolute)))

@@ -30,7 +30,7 @@ from pipeline.artefacts.catalogue.results import LEFT_OUT
 from pipeline.artefacts.streams import Stream
 from pipeline.config.pool import Adjust
 from pipeline.maths.adjustment.mean_tests import joint_limit
-from pipeline.maths.adjustment.parameters import WET_PARAMETERS
+from pipeline.maths.adjustment.parameters import WET_PARAMETERS, kind_of
 from pipeline.maths.adjustment.plane_tests import PlaneTest, plane_test
 from pipeline.maths.adjustment.residual_means import BinMean
 
@@ -70,7 +70,11 @@ class LeftOut:
 
 
 def adjust_true_faces(
-    problem: CalibrationProblem, streams: Mapping[str, Stream], settings: Adjust, gap_s: float, gate_m: float
+    problem: CalibrationProblem,
+    streams: Mapping[str, Stream],
+    settings: Adjust,
+    gap_s: float,
+    gates_m: Mapping[str, float],
 ) -> tuple[MountAdjustment, dict[str, Stream], pd.DataFrame]:
     """Return the adjustment of the faces that agree, the points it has used, and table ``left_out``.
 
@@ -84,22 +88,22 @@ def adjust_true_faces(
         Limits of the iteration, robust weights, level of the tests.
     gap_s : float
         A longer time (s) without observations interrupts the knots of the drift.
-    gate_m : float
-        Largest distance of a labelled sounding from its face, as labelled.
+    gates_m : mapping of float
+        Largest distance of a labelled sounding from its face, as labelled, by head of the sonar.
     """
     points, found, stripes = dict(streams), list[LeftOut](), list[Stripe]()
     for rounds in range(1, ROUNDS + 1):
         adjustment = adjust_mount(problem, points, settings, gap_s)
-        if not problem.prior.from_start or "mbes" not in points or adjustment.solution.deficiency:
+        if not problem.prior.from_start or adjustment.solution.deficiency:
             break
         profiles = {sensor: profiles_by_height(problem, adjustment, sensor, points[sensor]) for sensor in points}
-        more, off = _not_there(problem, profiles, gate_m), list[Stripe]()
+        more, off = _not_there(problem, profiles, gates_m), list[Stripe]()
         if not more:
             all_off = stripes_off(problem, adjustment, profiles, settings.test_tolerance_m)
             off = [stripe for stripe in all_off if not stripe.within(stripes)]
             more = [_of_stripe(problem, stripe) for stripe in off] or _contradicting(problem, adjustment, found)
-        seen = sum(name == "mbes" for name, _ in adjustment.accumulation.groups)
-        if rounds == ROUNDS or len({one.family for one in more if one.whole and one.sensor == "mbes"}) >= seen:
+        seen = {number for name, number in adjustment.accumulation.groups if kind_of(name) == "mbes"}
+        if rounds == ROUNDS or len({one.family for one in more if one.whole and one.sensor != "laser"}) >= len(seen):
             more = [replace(one, why="doubt") for one in more]  # nothing would be left, or it does not end
         found += more
         if not more or any(one.why == "doubt" for one in more):
@@ -125,24 +129,28 @@ def _whole_faces(problem: CalibrationProblem, left_out: Sequence[LeftOut]) -> It
     families = [surface.family for surface in problem.model.coarse.surfaces]
     for one in left_out:
         for face in np.flatnonzero(problem.model.faces.surface == families.index(one.family)).tolist():
-            yield Stripe(one.sensor, face, -np.inf, np.inf, one.value, one.points)
+            for head in problem.model.coarse.heads:
+                yield Stripe(head, face, -np.inf, np.inf, one.value, one.points)
 
 
-def _not_there(problem: CalibrationProblem, profiles: Mapping[str, Profiles], gate_m: float) -> list[LeftOut]:
+def _not_there(
+    problem: CalibrationProblem, profiles: Mapping[str, Profiles], gates_m: Mapping[str, float]
+) -> list[LeftOut]:
     """Return the surfaces with few soundings, or with soundings all over the gate, if the laser sees them, too."""
-    surface_of, by_surface = problem.model.faces.surface, dict[int, list[BinMean]]()
+    surface_of, by_surface = problem.model.faces.surface, dict[int, list[tuple[float, BinMean]]]()
     dry = {int(surface_of[face]) for face in profiles["laser"]}
-    for face, means in profiles["mbes"].items():
-        by_surface.setdefault(int(surface_of[face]), []).extend(means)
+    for head, gate_m in gates_m.items():
+        for face, means in profiles[head].items():
+            by_surface.setdefault(int(surface_of[face]), []).extend((gate_m, mean) for mean in means)
     found = []
-    for surface, means in sorted(by_surface.items()):
+    for surface, bins in sorted(by_surface.items()):
         if surface not in dry:
             continue
-        family, count = problem.model.coarse.surfaces[surface].family, sum(mean.count for mean in means)
-        scatter = sum(mean.count * (mean.rms_m**2 - mean.mean_m**2) for mean in means) / count
+        family, count = problem.model.coarse.surfaces[surface].family, sum(mean.count for _, mean in bins)
+        in_gates = sum(mean.count * (mean.rms_m**2 - mean.mean_m**2) / gate_m**2 for gate_m, mean in bins) / count
         if count < FEWEST_SOUNDINGS:
             found.append(LeftOut(family, "few", count))
-        elif scatter > (LARGEST_SHARE_OF_GATE * gate_m) ** 2:
+        elif in_gates > LARGEST_SHARE_OF_GATE**2:
             found.append(LeftOut(family, "scatter", count))
     return found
 
@@ -159,7 +167,7 @@ def _contradicting(
     for sensor, number in sorted(adjustment.accumulation.groups):
         own = {f"wet_{state.surfaces[number].family}_{name}" for name in WET_PARAMETERS}
         numbers = [k for k in known.numbers.tolist() if names[k] in own]
-        if sensor == "mbes" and numbers:
+        if kind_of(sensor) == "mbes" and numbers and number not in tests:
             test = plane_test(adjustment.solution, deviation, problem.consider, numbers)
             if test.rank:  # a face that the sonar alone sees stands where it does
                 tests[number] = test, numbers
@@ -182,7 +190,11 @@ def _off(adjustment: MountAdjustment, number: int, why: str, test: PlaneTest, pa
     return LeftOut(
         family=adjustment.state.surfaces[number].family,
         why=why,
-        points=adjustment.accumulation.groups["mbes", number].count,
+        points=sum(
+            group.count
+            for (sensor, surface), group in adjustment.accumulation.groups.items()
+            if surface == number and kind_of(sensor) == "mbes"
+        ),
         unknown=adjustment.state.names[parameters[k]],
         value=float(test.error[k]),
         sigma=float(test.sigma[k]),

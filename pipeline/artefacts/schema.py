@@ -46,6 +46,16 @@ class RawFiles:
 
 
 @dataclass(frozen=True)
+class OfFurtherHeads:
+    """A stage input: a table or stream of each further head of the sonar, by the head's name.
+
+    Each of these heads has a run of its own in the run folder, as if the session had no other.
+    """
+
+    artefact: Artefact
+
+
+@dataclass(frozen=True)
 class Document:
     """A stage output that is not a table: a text file for other programs or people."""
 

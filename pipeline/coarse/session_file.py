@@ -14,6 +14,7 @@ import pipeline
 from pipeline.atomic_files import sha256, write_bytes, writing
 from pipeline.coarse.session_edit import edit_mounts
 from pipeline.config.fill_in import is_unfilled, refuse_unfilled
+from pipeline.config.heads import heads_apart, refuse_several
 from pipeline.config.instruments import merge_presets
 from pipeline.config.load import session_yaml
 from pipeline.config.session import SessionConfig
@@ -36,6 +37,7 @@ def read_session(folder: Path) -> tuple[str, Content]:
     A mount that is still to be filled in counts as missing, and is not in the content.
     """
     file = YamlFile.read(session_yaml(folder))
+    refuse_several(heads_apart(file.content, str(file.path)), str(file.path))
     content = _without_unfilled_mounts(file.content)
     refuse_unfilled([file], may_be=lambda one: one.block in MOUNTS or one.key in MOUNTS)
     _check(content, folder)

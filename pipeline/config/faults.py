@@ -69,9 +69,11 @@ def _meant(unknown: str, known: list[str]) -> str:
     """Return a hint about an unknown key: the known keys like it; an empty text if there are none.
 
     >>> _meant("roll", ["roll_deg", "x_m"]), _meant("mbes2", ["ins", "mbes"])
-    ('is it roll_deg? ', 'one mbes is calibrated at a time: write one session.yaml for each; ')
+    ('is it roll_deg? ', 'write all heads under mbes, as a list of blocks; ')
     """
     bare = unknown.rstrip("0123456789_")
+    if bare == "mbes" and bare != unknown and bare in known:
+        return "write all heads under mbes, as a list of blocks; "
     if bare != unknown and bare in known:
         return f"one {bare} is calibrated at a time: write one session.yaml for each; "
     begun = [key for key in known if key.startswith(f"{unknown}_") or unknown.startswith(f"{key}_")]

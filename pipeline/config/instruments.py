@@ -15,6 +15,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, Field, create_model
 
 from pipeline import CONFIGS
+from pipeline.config.heads import HEADS
 from pipeline.config.plan import LaserFigures, MbesFigures, Plan
 from pipeline.config.quantities import Model
 from pipeline.config.references import INSTRUMENT, InstrumentTitle
@@ -84,7 +85,7 @@ def merge_presets(content: Block, folder: Path) -> tuple[Block, frozenset[str]]:
     Parameters
     ----------
     content : dict[str, Any]
-        Content of session.yaml. Its keys take precedence over a preset's.
+        Content of session.yaml, each head in a block of its own. Its keys take precedence over a preset's.
     folder : Path
         The session folder, which may have presets of its own.
 
@@ -94,7 +95,8 @@ def merge_presets(content: Block, folder: Path) -> tuple[Block, frozenset[str]]:
         The content with the presets' values, and the dotted keys of session.yaml itself (``ins.drift``,
         ``ins.drift.heading_deg``), without keys that only a preset has.
     """
-    full = {sensor: _with_preset(sensor, content[sensor], folder) for sensor in SENSORS if sensor in content}
+    blocks: dict[str, Sensor] = {sensor: sensor for sensor in SENSORS} | dict.fromkeys(HEADS, "mbes")
+    full = {name: _with_preset(sensor, content[name], folder) for name, sensor in blocks.items() if name in content}
     return content | full, frozenset(dotted_keys(content))
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from pipeline.config.fill_in import refuse_unfilled
 from pipeline.config.found import Find, with_found
+from pipeline.config.heads import heads_apart, refuse_several, refuse_single_blocks
 from pipeline.config.instruments import dotted_keys, merge_presets
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import SessionConfig
@@ -52,7 +53,7 @@ def load_session(folder: Path, with_cast: WithCast | None = None) -> SessionConf
     return session_in(YamlFile.read(session_yaml(folder)), with_cast)
 
 
-def session_in(file: YamlFile, with_cast: WithCast | None = None) -> SessionConfig:
+def session_in(file: YamlFile, with_cast: WithCast | None = None, several_heads: bool = False) -> SessionConfig:
     """Return the config in session.yaml, checked.
 
     Parameters
@@ -63,6 +64,8 @@ def session_in(file: YamlFile, with_cast: WithCast | None = None) -> SessionConf
         Function that replaces the name of a cast's file by the cast, in the content of session.yaml. It stands in
         readers/casts.py, which no module of config may import. A session that names such a file cannot be loaded
         without it.
+    several_heads : bool
+        False: refuse a session with several heads of the sonar.
 
     Raises
     ------
@@ -71,7 +74,11 @@ def session_in(file: YamlFile, with_cast: WithCast | None = None) -> SessionConf
     """
     refuse_unfilled([file])
     folder = file.path.parent
-    content, own_keys = merge_presets(file.content, folder)
+    refuse_single_blocks(file.content, str(file.path))
+    own = heads_apart(file.content, str(file.path))
+    if not several_heads:
+        refuse_several(own, str(file.path))
+    content, own_keys = merge_presets(own, folder)
     content = content if with_cast is None else with_cast(content, folder)
     ins = content.get("ins")
     if isinstance(ins, dict) and "drift" in ins and "ins.drift" not in own_keys:

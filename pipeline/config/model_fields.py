@@ -4,12 +4,15 @@ from typing import Any, get_args
 
 from pydantic import BaseModel, Tag
 
+from pipeline.config.heads import FURTHER
+
 Location = tuple[int | str, ...]  # place of a value in a file, as pydantic reports it: keys, and numbers in lists
 
 
 def known_keys(model: type[BaseModel], location: Location) -> list[str]:
     """Return the keys known at this place, sorted, for a message."""
-    return sorted(field_names(model, location)) or ["see docs/reference"]
+    names = (name for name in field_names(model, location) if not FURTHER.fullmatch(name))
+    return sorted(names) or ["see docs/reference"]
 
 
 def field_names(model: type[BaseModel], location: Location) -> list[str]:

@@ -1,6 +1,7 @@
 """Parts of which settings are made: a strict model, printable text, and numbers within plausible bounds."""
 
-from typing import Annotated
+from collections.abc import Mapping
+from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
@@ -34,6 +35,11 @@ class Model(BaseModel):
     """A block of settings: frozen, strict, without unknown keys."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+    @classmethod
+    def prepared(cls, content: Mapping[str, Any], where: str) -> dict[str, Any]:
+        """Return a file's content in the form in which this model's fields hold it; ``where``: the file."""
+        return dict(content)
 
 
 class TransmitSector(Model):

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from pipeline.config.about import About, AboutBlock
+from pipeline.config.heads import HEADS, WithHeads
 from pipeline.config.mount import Covariance, Mount, MountOrigin, MountSigma
 from pipeline.config.quantities import (
     BeamWidth,
@@ -25,6 +26,9 @@ from pipeline.config.recording import Files, Heights, LasTime, MaxRecords, Patte
 from pipeline.config.references import CastUsed, InstrumentUsed
 from pipeline.errors import ConfigError
 
+OF_WATER = (  # keys of Mbes that are the same for all heads
+    "sound_speed_m_s", "svp", "svp_sigma_m_s", "sound_speed_sigma_m_s", "sound_speed_gradient_sigma_1_s",
+)  # fmt: skip
 Calibrated = Literal["mbes", "laser"]  # which sensor is calibrated
 
 
@@ -166,13 +170,16 @@ class Mbes(Model):
         return self
 
 
-class SessionConfig(Model):
+class SessionConfig(WithHeads):
     """The session's config: SESSION/session.yaml."""
 
     name: Annotated[str, Field(min_length=1, max_length=300)]  # default: the session folder's name
     ins: Ins
     laser: Laser
-    mbes: Mbes | None = None  # None: the laser is calibrated
+    mbes: Mbes | None = None  # None: the laser is calibrated; of several heads the first
+    mbes_2: Mbes | None = None  # further heads: mbes is then a list
+    mbes_3: Mbes | None = None
+    mbes_4: Mbes | None = None
     about: AboutBlock = About()  # for the certificate alone
 
     @property
@@ -186,6 +193,25 @@ class SessionConfig(Model):
         if self.mbes is None:
             raise ConfigError("session.yaml: mbes is missing: there is no sonar to be calibrated; add its block")
         return self.mbes
+
+    @property
+    def heads(self) -> dict[str, Mbes]:
+        """The heads of the sonar by name, the first one first; none if the laser is calibrated."""
+        return {name: head for name in HEADS if (head := getattr(self, name)) is not None}
+
+    def alone(self, head: str) -> "SessionConfig":
+        """Return the session as if it had this head of the sonar alone."""
+        return self.model_copy(update=dict.fromkeys(HEADS[1:]) | {"mbes": self.heads[head]})
+
+    @model_validator(mode="after")
+    def _one_water(self) -> "SessionConfig":
+        for name, head in list(self.heads.items())[1:]:
+            for key in OF_WATER:
+                if getattr(head, key) != getattr(self.mbes, key):
+                    raise ValueError(
+                        f"{name}.{key} is not that of the first head, but all heads are in one water: give all the same"
+                    )
+        return self
 
     @property
     def recordings(self) -> Recordings:

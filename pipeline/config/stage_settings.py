@@ -127,6 +127,7 @@ def settings_by_name(pool: PoolConfig, session: SessionConfig) -> dict[str, Any]
         "target_place": pool.target_place,
         "recordings": session.recordings,
         "calibrated": session.calibrated,
+        "further_heads": {name: head for name, head in session.heads.items() if head is not session.mbes},
         "laser_fit": pool.laser_fit if session.calibrated == "laser" else None,
     }
 
@@ -149,7 +150,11 @@ def stage_config(config: type[C], settings: Mapping[str, Any]) -> C:
 def plain_settings(settings: Mapping[str, Any]) -> dict[str, Any]:
     """Return settings as plain values for JSON."""
     return {
-        name: value.model_dump(mode="json") if isinstance(value, BaseModel) else value
+        name: plain_settings(value)
+        if isinstance(value, dict)
+        else value.model_dump(mode="json")
+        if isinstance(value, BaseModel)
+        else value
         for name, value in settings.items()
     }
 

@@ -5,12 +5,13 @@ import math
 from typing import Any, TypeVar
 
 import yaml
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
 from pipeline.config.faults import fault_line
+from pipeline.config.quantities import Model
 from pipeline.errors import ConfigError
 
-M = TypeVar("M", bound=BaseModel)
+M = TypeVar("M", bound=Model)
 
 
 def parse(model: type[M], content: dict[str, Any], where: str, root: yaml.Node | None = None) -> M:
@@ -37,8 +38,9 @@ def parse(model: type[M], content: dict[str, Any], where: str, root: yaml.Node |
     ConfigError
         The content has a fault. The message is one line, about the first fault that matters.
     """
+    prepared = model.prepared(content, where)
     try:
-        return model.model_validate_json(_to_json(content, where), strict=True)
+        return model.model_validate_json(_to_json(prepared, where), strict=True)
     except ValidationError as error:
         raise ConfigError(fault_line(model, error.errors(include_url=False), where, root)) from error
 

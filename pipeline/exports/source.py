@@ -51,7 +51,7 @@ def mounting_of(run: FinishedRun, sensor: Calibrated | None, although_rejected: 
         origin = Origin(
             session=one_line(session.name),
             run=one_line(run.path.resolve().name),
-            kind=f"calibrated mount, result {run.result['result']}",
+            kind=f"calibrated mount{_of_head(run)}, result {run.result['result']}",
             rejected=None if rejected is None else tuple(map(one_line, rejected)),
             held=tuple(map(str, run.result.get("held", ()))),
             free=tuple(one_line(str(one["words"])) for one in run.result.get("free", {}).values()),
@@ -67,6 +67,11 @@ def mounting_of(run: FinishedRun, sensor: Calibrated | None, although_rejected: 
         else:
             raise ConfigError(f"{run.path}: calibrates the laser alone, and holds no sonar; name a sonar's run")
     return _with_settings(mounting, session)
+
+
+def _of_head(run: FinishedRun) -> str:
+    """Return words for the head whose mount it is; nothing if the sonar has one."""
+    return f" of head {one_line(run.result['head'])}" if "head" in run.result else ""
 
 
 def one_line(text: str) -> str:

@@ -19,7 +19,8 @@ from pipeline.finding.dry_planes import DryPlane
 from pipeline.finding.kept_points import KeptPoints
 from pipeline.maths.adjustment.body_motion import BodyMotion
 from pipeline.maths.adjustment.face_shifts import Faces
-from pipeline.maths.adjustment.parameters import ObservedSurface, State
+from pipeline.maths.adjustment.observed_surface import ObservedSurface
+from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.pose_errors import PoseNoise
 from pipeline.maths.adjustment.solution import ConsiderErrors
 from pipeline.maths.geometry.trajectory import Trajectory

@@ -165,7 +165,7 @@ def assess_plan(plan: Plan, pool: PoolConfig, session: SessionConfig) -> PlanAss
     depth = setting.model.depth_m
     faces = faces_on_surfaces(setting.model.faces, setting.state)
     names = (*setting.state.names, *faces.parameters)
-    considered = sonar_errors(names, session.laser, session.sonar, pool.as_built, depth)
+    considered = sonar_errors(names, session.laser, {"mbes": session.sonar}, pool.as_built, depth)
     turn_s = plan.budget.turn_s if plan.budget is not None else Budget.model_fields["turn_s"].default
     free, prior = estimated_columns(setting.state, pool.adjust.free), np.zeros((setting.state.size, setting.state.size))
     known = known_parameters(setting.state, considered, pool.adjust.free)

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.config.heads import HEADS
 from pipeline.config.recording import inside_session
 from pipeline.errors import ConfigError, RawDataError
 from pipeline.maths.sonar.cast_profile import TOLERANCE_M_S, thinned_profile
@@ -32,31 +33,35 @@ MAX_LISTED = 10  # casts that a message lists
 def with_cast(content: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """Return session.yaml's content with the cast's rows in place of its file's name, and their record ``svp_from``.
 
+    Each head of the sonar has a block of its own in the content, and its cast in it.
+
     Raises
     ------
     ConfigError, RawDataError
         The keys contradict each other, the file does not exist, no number chooses among several casts, or the cast
         cannot be used.
     """
-    block = content.get("mbes")
-    if not isinstance(block, dict):
-        return dict(content)
-    where = f"{folder / 'session.yaml'}: mbes"
+    blocks = {head: content[head] for head in HEADS if isinstance(content.get(head), dict)}
+    return dict(content) | {head: _block_with_cast(head, block, folder) for head, block in blocks.items()}
+
+
+def _block_with_cast(head: str, block: dict[str, Any], folder: Path) -> dict[str, Any]:
+    where = f"{folder / 'session.yaml'}: {head}"
     if "svp_from" in block:
         raise ConfigError(f"{where}.svp_from: is written by poolcal, in run.yaml; take it out")
     pattern, number = block.get("svp"), block.get("svp_number")
     if not isinstance(pattern, str):
         if number is not None:
             raise ConfigError(
-                f"{where}.svp_number = {number!r}: belongs to a file of casts, but mbes.svp names none; name the file "
-                "there, or take svp_number out"
+                f"{where}.svp_number = {number!r}: belongs to a file of casts, but {head}.svp names none; name the "
+                "file there, or take svp_number out"
             )
-        return dict(content)
+        return block
     try:
         inside_session(pattern)
     except ValueError as error:
         raise ConfigError(f"{where}.svp = {pattern!r}: {error}") from error
-    files = files_matching(folder, [pattern], "mbes.svp")
+    files = files_matching(folder, [pattern], f"{head}.svp")
     if len(files) > 1:
         names = ", ".join(file.name for file in files[:3])
         raise ConfigError(f"{where}.svp = {pattern!r}: matches {len(files)} files ({names}); name one")
@@ -64,7 +69,7 @@ def with_cast(content: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     if not file.name.isprintable():
         raise RawDataError(f"{file.name!a}: the cast's name has letters that cannot be shown; rename the file")
     svp, used = read_cast(file.path, file.name, number)
-    return dict(content) | {"mbes": block | {"svp": svp, "svp_from": used}}
+    return block | {"svp": svp, "svp_from": used}
 
 
 def read_cast(path: Path, name: str, number: Any = None) -> tuple[list[list[float]], dict[str, Any]]:

@@ -105,11 +105,14 @@ def correlation_matrix(covariance: pd.DataFrame) -> list[list[float]] | None:
 
 
 def pass_rows(passes: pd.DataFrame, cells: pd.DataFrame) -> list[dict[str, Any]]:
-    """Return a row for each pass: start, distance, duration, and the observations on the target by table ``cells``."""
-    rows = []
+    """Return a row for each pass: start, distance, duration, and the observations on the target by table ``cells``.
+
+    Of a sonar with several heads the soundings are also counted by head.
+    """
+    rows, heads = [], sorted({"mbes", *cells["sensor"]} - {"laser"})
     for row in passes.to_dict("records"):
         means = cells[cells["pass"] == row["pass"]]
-        on_target = {sensor: int(means.loc[means["sensor"] == sensor, "count"].sum()) for sensor in ("laser", "mbes")}
+        on_target = {sensor: int(means.loc[means["sensor"] == sensor, "count"].sum()) for sensor in ("laser", *heads)}
         rows.append(
             {
                 "pass": int(row["pass"]),
@@ -117,7 +120,8 @@ def pass_rows(passes: pd.DataFrame, cells: pd.DataFrame) -> list[dict[str, Any]]
                 "distance_m": json_number(round(row["distance_m"], 2)),
                 "duration_s": json_number(round(row["duration_s"], 1)),
                 "laser_points": on_target["laser"],
-                "soundings": on_target["mbes"],
+                "soundings": sum(on_target[head] for head in heads),
+                **({f"soundings_{head}": on_target[head] for head in heads} if len(heads) > 1 else {}),
             }
         )
     return rows

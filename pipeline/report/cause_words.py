@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.maths.adjustment.parameters import of_head
+
 AXES = {"x": "pitch", "y": "roll", "z": "yaw"}
 FACES_OF_FAMILY = {"P1": "on the -y side", "P2": "of the wall", "P3": "on the +y side", "H": "that are horizontal"}
 TURNS_OF_FAMILY = dict.fromkeys(  # turns of the normal along the tangents (maths/geometry/planes.py)
@@ -88,6 +90,7 @@ def unit_of(name: str) -> tuple[float, str]:
     >>> unit_of("mbes_latency"), unit_of("wet_return-south_shift")
     ((1000.0, 'ms'), (1000.0, 'mm'))
     """
+    _, name = of_head(name)
     if name in WORDS:
         scale, unit, _ = WORDS[name]
         return scale, "(m/s)/m" if name == "sound_speed_gradient" else unit
@@ -96,8 +99,13 @@ def unit_of(name: str) -> tuple[float, str]:
 
 
 def words_of(row: Mapping[Any, Any]) -> str:
-    """Return in words the estimate of one parameter, and the setting or device to check."""
-    name, value, sigma = str(row["unknown"]), float(row["value"]), float(row["sigma"])
+    """Return in words the estimate of one parameter, and the setting or device to check; a further head is named."""
+    head, name = of_head(str(row["unknown"]))
+    words = _words_of(name, float(row["value"]), float(row["sigma"]))
+    return f"{head}: {words}" if head else words
+
+
+def _words_of(name: str, value: float, sigma: float) -> str:
     if name in WORDS:
         scale, unit, words = WORDS[name]
         return words.format(size_words(scale * value, scale * sigma, unit))

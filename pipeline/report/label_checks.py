@@ -4,15 +4,21 @@ import numpy as np
 import pandas as pd
 
 from pipeline.adjustment.wet_planes import FEWEST_SOUNDINGS, LARGEST_SHARE_OF_GATE
-from pipeline.report.noise_warnings import POINTS
+from pipeline.report.noise_warnings import points_of
 from pipeline.report.reason_codes import ReasonCode, Statement
 
 MAX_LABEL_CHANGE = 0.01  # share of the labels that the last provisional adjustment may change; usual: 0.001
 
 
-def too_few_soundings(cells: pd.DataFrame) -> list[Statement]:
-    """Return a reason for each family with too few soundings for reliable labels. A family without any is not used."""
-    count = cells[cells["sensor"] == "mbes"].groupby("family")["count"].sum()
+def too_few_soundings(cells: pd.DataFrame, head: str = "mbes") -> list[Statement]:
+    """Return a reason for each family with too few soundings for reliable labels. A family without any is not used.
+
+    Parameters
+    ----------
+    cells : the table
+    head : the head of the sonar
+    """
+    count = cells[cells["sensor"] == head].groupby("family")["count"].sum()
     return [
         Statement(
             ReasonCode.TOO_FEW_SOUNDINGS,
@@ -41,7 +47,7 @@ def noise_cut_by_gate(cells: pd.DataFrame, gates_m: dict[str, float]) -> list[St
         rms_m = float(np.sqrt(np.average(rows["rms_m"] ** 2, weights=rows["count"])))
         if rms_m > LARGEST_SHARE_OF_GATE * gates_m[sensor]:
             words = (
-                f"{POINTS[sensor]} on {family} scatter by {1000 * rms_m:.0f} mm, and those more than "
+                f"{points_of(sensor)} on {family} scatter by {1000 * rms_m:.0f} mm, and those more than "
                 f"{1000 * gates_m[sensor]:.0f} mm off its faces are not used: the result may be drawn to where the "
                 "search began; look for what makes them so noisy (weed, a face that is not there, a wrong range gate), "
                 "or enter a larger segment.gate_m"

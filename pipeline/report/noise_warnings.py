@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 
+from pipeline.maths.adjustment.parameters import kind_of
 from pipeline.maths.adjustment.score_check import largest_ratio
 from pipeline.maths.mount_parameters import MOUNT_NAMES, MOUNT_WORDS, N_MOUNT
 from pipeline.report.reason_codes import ReasonCode, Statement
@@ -13,10 +14,19 @@ from pipeline.report.reason_codes import ReasonCode, Statement
 # slant range on a face at 45° to it, six metres away: twice or three times the wall's noise is usual. A laser's noise
 # grows as the intensity of its echo falls, to twice at grazing incidence.
 USUAL_RATIO = {"laser": 2.0, "mbes": 3.0}
-POINTS = {"laser": "laser points", "mbes": "soundings"}
 CERTAIN = 3.0  # sigmas by which a ratio must exceed the usual one
 MAX_DESIGN_EFFECT = 1.5  # of the soundings of a ping
 MAX_SIGMA_RATIO = 1.2  # of a sigma by the scatter of slots of time to the sigma of the model
+
+
+def points_of(sensor: str) -> str:
+    """Return words for a sensor's points.
+
+    >>> points_of("mbes"), points_of("mbes_2")
+    ('soundings', 'soundings of mbes_2')
+    """
+    words = {"laser": "laser points", "mbes": "soundings"}
+    return words.get(sensor, f"soundings of {sensor}")
 
 
 def uneven_noise(groups: pd.DataFrame) -> Iterator[Statement]:
@@ -32,11 +42,11 @@ def uneven_noise(groups: pd.DataFrame) -> Iterator[Statement]:
             usual = float(information[others] @ factor[others] / information[others].sum())
             uncertainty = float(np.sqrt(1 / information[k] + 1 / information[others].sum()))  # of the ratio's logarithm
             ratio = factor[k] / usual
-            if np.log(ratio) - CERTAIN * uncertainty > 2 * np.log(USUAL_RATIO[str(sensor)]):
+            most = USUAL_RATIO[kind_of(str(sensor))]
+            if np.log(ratio) - CERTAIN * uncertainty > 2 * np.log(most):
                 words = (
-                    f"{POINTS[str(sensor)]} on {name} scatter {np.sqrt(ratio):.1f} times as much as on the other faces "
-                    f"(up to {USUAL_RATIO[str(sensor)]:g} times is usual): look at their residuals; the sigmas allow "
-                    "for it"
+                    f"{points_of(str(sensor))} on {name} scatter {np.sqrt(ratio):.1f} times as much as on the other "
+                    f"faces (up to {most:g} times is usual): look at their residuals; the sigmas allow for it"
                 )
                 yield Statement(ReasonCode.NOISE_DIFFERS_BY_FAMILY, words)
 

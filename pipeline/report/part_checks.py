@@ -7,7 +7,7 @@ import pandas as pd
 
 from pipeline.maths.adjustment.mean_tests import joint_limit
 from pipeline.maths.mount_parameters import PARAMETERS
-from pipeline.report.reason_codes import ReasonCode, Statement
+from pipeline.report.reason_codes import ReasonCode, Statement, named
 
 
 def parts_block(parts: pd.DataFrame, level: float) -> list[dict[str, Any]]:
@@ -50,7 +50,8 @@ def disagreeing_parts(parts: pd.DataFrame, level: float) -> list[Statement]:
     each = [(abs(row[f"change_{name}"] / row[f"sigma_{name}"]), name, unit) for name, _, _, unit in PARAMETERS]
     _, name, unit = max(entry for entry in each if np.isfinite(entry[0]))
     change, sigma = (_with_unit(row[f"{kind}_{name}"], unit) for kind in ("change", "sigma"))
-    if "soundings" in row["part"]:  # those on a face
+    part, head = part_and_head(row["part"])
+    if "soundings" in part:  # those on a face
         cause = (
             "that wall or another does not go on below the water as above: see what is there, and strike it "
             "(target.strike)"
@@ -60,10 +61,19 @@ def disagreeing_parts(parts: pd.DataFrame, level: float) -> list[Statement]:
             "something changed during the session (the bracket, a clock, the water, the INS's solution); sail again, "
             "or calibrate the passes apart to find which of them is wrong"
         )
-    where = f"{row['part']}," if row["part"].startswith("without") else f"from the {row['part']} alone"
+    where = f"{part}," if part.startswith("without") else f"from the {part} alone"
     off = f"{name} would be another by {change} ± {sigma} ({row['normalised']:.1f} sigma over all parameters)"
-    words = f"{where} {off}: {cause}"
-    return [Statement(ReasonCode.PARTS_DISAGREE, words)]
+    return named(head, [Statement(ReasonCode.PARTS_DISAGREE, f"{where} {off}: {cause}")])
+
+
+def part_and_head(name: str) -> tuple[str, str]:
+    """Return the part and the further head of the sonar in a name of table ``parts``; empty if it is of the first.
+
+    >>> part_and_head("first half (mbes_2)"), part_and_head("without pass 3")
+    (('first half', 'mbes_2'), ('without pass 3', ''))
+    """
+    part, _, head = name.partition(" (")
+    return part, head.removesuffix(")")
 
 
 def _with_unit(value: float, unit: str) -> str:

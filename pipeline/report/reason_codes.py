@@ -3,7 +3,7 @@
 People read the words beside a code, which may be mended. Programs read the code, which never changes.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Self
@@ -80,6 +80,7 @@ class ReasonCode(StrEnum):
     ROUGH_WALL = "rough_wall", "patches of the walls stand off their planes, and the sigmas allow for it"
     PASS_WITHOUT_SOUNDINGS = "pass_without_soundings", "in some passes the laser alone saw the target"
     PASS_WITHOUT_LASER = "pass_without_laser", "in some passes the sonar alone saw the target"
+    SOUNDINGS_OUTSIDE_PASSES = "soundings_outside_passes", "a further head saw the target outside the first's passes"
     LENGTH_OFF_DESIGN = "length_off_design", "b or e of the target is measured otherwise than designed"
     ANGLE_OFF_DESIGN = "angle_off_design", "an angle between faces is measured otherwise than designed"
     ERROR_ALLOWED_FOR = "error_allowed_for", "a systematic error within its a-priori sigma shows, and is allowed for"
@@ -98,6 +99,11 @@ class Statement:
 
     code: ReasonCode
     words: str
+
+
+def named(head: str, statements: Iterable[Statement]) -> list[Statement]:
+    """Return statements with the name of the head that they are about; unchanged if the name is empty."""
+    return [Statement(one.code, f"{head}: {one.words}" if head else one.words) for one in statements]
 
 
 def verdict_in_words(verdict: str, held: Collection[str] = (), purpose: str = "") -> str:

@@ -238,6 +238,11 @@ REMEDIES: dict[Code, Remedy] = {
         "In a pass the sonar saw the target and the laser has no points on it.",
         "See that the scanner was recording.",
     ),
+    Code.SOUNDINGS_OUTSIDE_PASSES: Remedy(
+        "The first head did not record while a further head saw the target: a file of the first head is missing, or it "
+        "was switched on later.",
+        "Add the file, or list the head that recorded most first.",
+    ),
     Code.LENGTH_OFF_DESIGN: Remedy(
         "By the laser's planes b or e of the target is not what the pool's config says.",
         "Measure the target; correct b or e, or give as_built.faces.",

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from pipeline.maths.adjustment.parameters import kind_of
 from pipeline.report.reason_codes import ReasonCode, Statement
 
 CYCLE = "ping_"  # before the length of the cycle in pings
-SENSORS = {"laser": "the laser", "mbes": "the sonar"}
 MAX_DRIFT_M = 0.05  # a larger mean residual is no effect of drift: the model is wrong
 SAME_STEP_DEG = 3.0  # steps at angles that differ by less are one step
 NEAR_WATER_M = 0.6  # a step farther from the water is not due to it
@@ -51,6 +51,15 @@ class ExceededTests:
         return f"{beyond}, limit {self.limit:.1f}"
 
 
+def sensor_words(sensor: str) -> str:
+    """Return words for a sensor.
+
+    >>> sensor_words("mbes"), sensor_words("mbes_2")
+    ('the sonar', 'the sonar mbes_2')
+    """
+    return {"laser": "the laser", "mbes": "the sonar"}.get(sensor, f"the sonar {sensor}")
+
+
 # --- passes ------------------------------------------------------------------------------------------------------
 def describe_pass(row: Row, exceeded: ExceededTests) -> Statement:
     """Return a reason that describes a pass that deviates, and whether the other sensor deviates there, too."""
@@ -59,22 +68,23 @@ def describe_pass(row: Row, exceeded: ExceededTests) -> Statement:
     patterns = exceeded.tests.patterns
     means, number = patterns[patterns["by"] == "pass"], int(row["low"])
     of_other = (means["family"] == row["family"]) & (means["low"] == row["low"]) & (means["sensor"] != row["sensor"])
+    of_other &= means["sensor"].map(kind_of) != kind_of(row["sensor"])
     other_m = means[of_other]["mean_m"]
     is_of_both = bool(len(other_m)) and float(other_m.iloc[0]) * row["mean_m"] > row["mean_m"] ** 2 / 4
-    other_sensor = SENSORS["mbes" if row["sensor"] == "laser" else "laser"]
+    other_sensor = sensor_words("mbes" if row["sensor"] == "laser" else "laser")
     also = f" and {other_sensor} {1000 * other_m.iloc[0]:+.1f} mm" if is_of_both else ""
     if abs(row["mean_m"]) > MAX_DRIFT_M:
         cause = f"wrong {exceeded.tests.shape}, or a coarse mount farther off than segment searches"
     elif is_of_both:
         cause = "drift of the INS in that pass, or its clock: sail again, in shorter time"
-    elif row["sensor"] == "mbes":
+    elif kind_of(row["sensor"]) == "mbes":
         cause = "the sonar's clock, the sound speed, or a bracket that moved"
     else:
         cause = "a wrong laser.mount, the laser's clock, or INS drift between the passes"
     return Statement(
         ReasonCode.PASSES_DISAGREE,
-        f"the passes do not agree: in pass {number} {SENSORS[row['sensor']]} lies {1000 * row['mean_m']:+.1f} mm{also} "
-        f"off {row['family']} against the other passes ({exceeded.outcome(row)}); likely {cause}",
+        f"the passes do not agree: in pass {number} {sensor_words(row['sensor'])} lies {1000 * row['mean_m']:+.1f} "
+        f"mm{also} off {row['family']} against the other passes ({exceeded.outcome(row)}); likely {cause}",
     )
 
 
@@ -97,7 +107,8 @@ def describe_pattern(row: Row, exceeded: ExceededTests) -> Statement:
         return _step(row, exceeded)
     if variable.startswith(CYCLE):
         return _cycle(row, exceeded)
-    lies = f"{SENSORS[row['sensor']]} lies {1000 * row['mean_m']:+.1f} mm off {row['family']} ({exceeded.outcome(row)})"
+    seen, outcome = sensor_words(row["sensor"]), exceeded.outcome(row)
+    lies = f"{seen} lies {1000 * row['mean_m']:+.1f} mm off {row['family']} ({outcome})"
     if variable == "face":
         return Statement(
             ReasonCode.RESIDUALS_BY_FACE,
@@ -105,7 +116,7 @@ def describe_pattern(row: Row, exceeded: ExceededTests) -> Statement:
             "where the config has it: survey it (as_built.faces), and see what stands before it",
         )
     if variable == "angle":
-        angles = "receive angles" if row["sensor"] == "mbes" else "elevations"
+        angles = "receive angles" if kind_of(row["sensor"]) == "mbes" else "elevations"
         words = f"residuals go with angle: between {angles} {low:.0f}° and {high:.0f}° {lies}"
         return Statement(ReasonCode.RESIDUALS_BY_ANGLE, words)
     if variable == "height":
@@ -127,10 +138,10 @@ def _cycle(row: Row, exceeded: ExceededTests) -> Statement:
     which = f"one ping of {pings} (those whose number divided by {pings} leaves {row['low']:.0f})"
     return Statement(
         ReasonCode.RESIDUALS_BY_PING,
-        f"residuals go with pings: in {which} the sonar lies {1000 * row['mean_m']:+.1f} mm off {row['family']} "
-        f"against the other pings ({exceeded.outcome(row)}); likely modes taken in turn (frequencies, swaths) whose "
-        "transmit fans have different tilts: give each sounding its tilt (column transmit_tilt_deg of a table), or "
-        "record in a single mode",
+        f"residuals go with pings: in {which} {sensor_words(row['sensor'])} lies {1000 * row['mean_m']:+.1f} mm off "
+        f"{row['family']} against the other pings ({exceeded.outcome(row)}); likely modes taken in turn (frequencies, "
+        "swaths) whose transmit fans have different tilts: give each sounding its tilt (column transmit_tilt_deg of a "
+        "table), or record in a single mode",
     )
 
 
@@ -140,16 +151,16 @@ def _height(row: Row, exceeded: ExceededTests) -> Statement:
     where = f"{abs(height_m):.1f} m {'above' if height_m > 0 else 'below'} the water"
     if abs(height_m) > NEAR_WATER_M:
         cause = "an edge beside these points, or what stands before the face: keep off by segment.margin_m"
-    elif row["sensor"] == "mbes":
+    elif kind_of(row["sensor"]) == "mbes":
         cause = "echoes by way of the water's surface, or bubbles: keep off by segment.water_margin_m"
     else:
         cause = "drops, weed or a wet face: keep off by segment.water_margin_m"
-    if row["sensor"] == "mbes":
+    if kind_of(row["sensor"]) == "mbes":
         cause += "; or beams wider than session.yaml says (mbes.focused, beam_deg)"
     return Statement(
         ReasonCode.RESIDUALS_BY_HEIGHT,
-        f"residuals go with height: {where} {SENSORS[row['sensor']]}'s distance from face {row['family']} steps by "
-        f"{1000 * row['mean_m']:+.1f} mm, above less below ({exceeded.outcome(row)}); likely {cause}",
+        f"residuals go with height: {where} {sensor_words(row['sensor'])}'s distance from face {row['family']} steps "
+        f"by {1000 * row['mean_m']:+.1f} mm, above less below ({exceeded.outcome(row)}); likely {cause}",
     )
 
 
@@ -172,6 +183,6 @@ def _step(row: Row, exceeded: ExceededTests) -> Statement:
         )
     return Statement(
         ReasonCode.RESIDUALS_STEP,
-        f"residuals go with angle: at a receive angle of {row['low']:.0f}° the sonar's distance from {row['family']} "
-        f"steps by {1000 * row['mean_m']:+.1f} mm{also} ({exceeded.outcome(row)}); likely {cause}",
+        f"residuals go with angle: at a receive angle of {row['low']:.0f}° {sensor_words(row['sensor'])}'s distance "
+        f"from {row['family']} steps by {1000 * row['mean_m']:+.1f} mm{also} ({exceeded.outcome(row)}); likely {cause}",
     )

@@ -24,6 +24,7 @@ import numpy as np
 import pandas as pd
 
 from pipeline.maths.adjustment.mean_tests import joint_limit
+from pipeline.maths.adjustment.parameters import of_head
 from pipeline.maths.mount_parameters import MOUNT_NAMES
 from pipeline.report.cause_words import words_of, words_of_set
 from pipeline.report.reason_codes import ReasonCode, Statement
@@ -116,7 +117,7 @@ def errors_allowed_for(freed: pd.DataFrame, level: float) -> list[Statement]:
     limit, warnings = significance_limit(freed, level), []
     for row in freed[freed["known"] & ~freed["unknown"].isin(MOUNT_NAMES)].to_dict("records"):
         if limit * row["sigma"] < abs(row["value"]) <= limit * row["expected"]:
-            survey = ", the survey does not yet" if row["unknown"].startswith(OF_HEAD) else ""
+            survey = ", the survey does not yet" if of_head(row["unknown"])[1].startswith(OF_HEAD) else ""
             words = f"the mount allows for this{survey}: {words_of(row)}"
             warnings.append(Statement(ReasonCode.ERROR_ALLOWED_FOR, words))
     return warnings
@@ -129,7 +130,7 @@ def estimated_parameters(freed: pd.DataFrame) -> list[EstimatedParameter]:
             unknown=row["unknown"],
             value=row["value"],
             sigma_total=row["sigma"],
-            unit=UNITS[row["unknown"]],
+            unit=UNITS[of_head(row["unknown"])[1]],
             words=words_of(row),
             normalised=abs(row["value"]) / row["expected"],
         )

@@ -33,7 +33,7 @@ planning/observability.py.
 ``MAX_DRIFT_M`` and ``SAME_STEP_DEG`` of residual_words.py only change the words of a reason.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -49,7 +49,7 @@ from pipeline.report.hypotheses import Hypothesis, hypotheses
 from pipeline.report.label_checks import noise_cut_by_gate, too_few_soundings
 from pipeline.report.limit_checks import patent_reasons, sigmas_above_limit, soundings_above_limit
 from pipeline.report.part_checks import disagreeing_parts
-from pipeline.report.reason_codes import ReasonCode, Statement
+from pipeline.report.reason_codes import ReasonCode, Statement, named
 from pipeline.report.residual_tests import deviating_parts, deviations
 from pipeline.report.residual_words import ResidualTests
 from pipeline.report.sigma_sources import contributions
@@ -89,12 +89,31 @@ class Criteria:
     laser_correlates: bool = False
 
 
+@dataclass(frozen=True, kw_only=True)
+class JudgedHead:
+    """A further head of the sonar, which was adjusted together with the first.
+
+    Attributes
+    ----------
+    name : name of the head
+    evidence : tables of the run, with those of this head in place of the first's
+    methods : blocks of its calibration by method
+    criteria : as for the first head
+    """
+
+    name: str
+    evidence: Evidence
+    methods: Mapping[str, Mapping[str, Any]]
+    criteria: Criteria
+
+
 def rejections(
     evidence: Evidence,
     methods: Mapping[str, Mapping[str, Any]],
     criteria: Criteria,
     drift_check: Statement | None = None,
     off_figures: Statement | None = None,
+    further: Sequence[JudgedHead] = (),
 ) -> list[Statement]:
     """Return the reasons for which the calibration is rejected; empty if it is accepted.
 
@@ -107,8 +126,11 @@ def rejections(
     criteria : limits, levels and tolerances
     drift_check : doubt about the figures of the INS's drift; a reason only if residuals deviate or a cause is suspected
     off_figures : that the INS drifts more than its figures say; a reason only if sigmas are above their limits
+    further : the sonar's further heads; one that is beyond its limits rejects the whole
     """
-    if doubts := _doubts(evidence, criteria):
+    first = JudgedHead(name="mbes" if further else "", evidence=evidence, methods=methods, criteria=criteria)
+    heads = (first, *further)
+    if doubts := [one for head in heads for one in named(head.name, _doubts(head.evidence, head.criteria))]:
         return doubts
     summary = evidence.summary.iloc[0]
     if summary["reason"]:
@@ -119,8 +141,11 @@ def rejections(
         words = f"the adjustment did not converge in {summary['iterations']} steps"
         reasons.append(Statement(ReasonCode.NOT_CONVERGED, words))
     reasons += ambiguous_minimum(summary)
-    gates_m = {"laser": evidence.target_pose["gate_m"].iloc[0], "mbes": evidence.provisional_mount["gate_m"].iloc[0]}
-    reasons += too_few_soundings(evidence.cells) + faces_in_doubt(evidence.left_out)
+    gates_m = {"laser": evidence.target_pose["gate_m"].iloc[0]}
+    for head in heads:
+        gates_m[head.name or "mbes"] = head.evidence.provisional_mount["gate_m"].iloc[0]
+        reasons += named(head.name, too_few_soundings(evidence.cells, head.name or "mbes"))
+    reasons += faces_in_doubt(evidence.left_out)
     reasons += _residual_reasons(evidence, criteria, drift_check)
     reasons += noise_cut_by_gate(evidence.cells, gates_m)  # a face that is off scatters too, and is named before
     reasons += disagreeing_parts(evidence.parts, criteria.test_level)
@@ -129,14 +154,36 @@ def rejections(
     if len(criteria.held) == len(PARAMETERS):
         words = "no mount parameter is good enough: none is within its limit and better than the coarse mount"
         reasons.append(Statement(ReasonCode.NO_PARAMETER_ESTIMABLE, words))
-    sources = contributions(evidence.freed, methods["adjustment"], criteria.laser_correlates)
-    wide = sigmas_above_limit(methods["adjustment"]["sigma_mount_total"], criteria.limits, criteria.held, sources)
-    wide += soundings_above_limit(methods["adjustment"]["covariance_total"], criteria.limits)
+    wide = [one for head in heads for one in named(head.name, _beyond_limits(head))]
     reasons += [off_figures, *wide] if wide and off_figures is not None else wide
-    if criteria.method != "adjustment" and evidence.corrections is not None:
-        row = evidence.corrections.set_index("method").loc[criteria.method]
-        reasons += patent_reasons(criteria.method, row, methods, criteria.limits)
-    return reasons
+    return reasons + [one for head in heads for one in named(head.name, _patent_reasons(head))]
+
+
+def own_reasons(head: JudgedHead) -> list[Statement]:
+    """Return the reasons that are about one head alone: doubts about it, too few soundings, its limits."""
+    if doubts := _doubts(head.evidence, head.criteria):
+        return doubts
+    return [
+        *too_few_soundings(head.evidence.cells, head.name),
+        *_beyond_limits(head),
+        *_patent_reasons(head),
+    ]
+
+
+def _patent_reasons(head: JudgedHead) -> list[Statement]:
+    corrections, method = head.evidence.corrections, head.criteria.method
+    if method == "adjustment" or corrections is None:
+        return []
+    row = corrections.set_index("method").loc[method]
+    return list(patent_reasons(method, row, head.methods, head.criteria.limits))
+
+
+def _beyond_limits(head: JudgedHead) -> list[Statement]:
+    """Return the reasons by the limits of the total sigmas."""
+    adjusted, criteria = head.methods["adjustment"], head.criteria
+    sources = contributions(head.evidence.freed, adjusted, criteria.laser_correlates)
+    wide = sigmas_above_limit(adjusted["sigma_mount_total"], criteria.limits, criteria.held, sources)
+    return [*wide, *soundings_above_limit(adjusted["covariance_total"], criteria.limits)]
 
 
 def _doubts(evidence: Evidence, criteria: Criteria) -> list[Statement]:

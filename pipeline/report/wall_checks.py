@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from pipeline.maths.adjustment.parameters import kind_of
 from pipeline.report.calibration_document import json_number
 from pipeline.report.cause_words import size_words
-from pipeline.report.noise_warnings import POINTS
+from pipeline.report.noise_warnings import points_of
 from pipeline.report.reason_codes import ReasonCode, Statement
 
 LEAST_PATCH_M = 0.001  # RMS of a wall's patches that is worth a word
@@ -55,7 +56,7 @@ def left_out_block(left_out: pd.DataFrame) -> dict[str, Any]:
 
 
 def _words(row: dict[Any, Any]) -> str:
-    points, family, number = POINTS[row["sensor"]], row["family"], int(row["points"])
+    points, family, number = points_of(row["sensor"]), row["family"], int(row["points"])
     if row["why"] == "few":
         return (
             f"the soundings on {family} are left out, for they are too few to trust ({number}): below the water the "
@@ -108,8 +109,8 @@ def _heights(row: dict[Any, Any]) -> str:
 
 def rough_walls(groups: pd.DataFrame) -> Iterator[Statement]:
     """Yield a warning for each sensor to which walls are rough (table ``groups``)."""
-    for sensor, where in SEEN_BY.items():
-        rows = groups[(groups["sensor"] == sensor) & (groups["patch_m"] >= LEAST_PATCH_M)]
+    for sensor, of_sensor in groups.groupby("sensor", sort=True):
+        rows, where = of_sensor[of_sensor["patch_m"] >= LEAST_PATCH_M], SEEN_BY[kind_of(str(sensor))]
         walls = ", ".join(f"{row['family']} by {1000 * row['patch_m']:.0f} mm" for row in rows.to_dict("records"))
         if walls:
             words = (

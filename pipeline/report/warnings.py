@@ -25,7 +25,7 @@ GROUP_WORDS = {
     "mbes_vertical": "soundings on vertical faces",
     "mbes_horizontal": "soundings on horizontal faces",
 }
-COMMON_NOISE = ("ins_white", "ping")  # groups of noise common to an epoch's points
+INS_NOISE, PING_NOISE = "ins_white", "ping"  # groups of noise common to an epoch's points
 
 
 def geometry_gaps(geometry: pd.DataFrame, sigmas: Mapping[str, float] | None) -> list[Statement]:
@@ -49,10 +49,11 @@ def _sigma_suffix(sigmas: Mapping[str, float]) -> str:
 
 def unexpected_noise(groups: pd.DataFrame) -> Iterator[Statement]:
     """Yield a warning for each group of observations (table ``groups``) with unexpected noise or many outliers."""
-    yield from _common_noise(groups[groups["group"].isin(COMMON_NOISE)].set_index("group").to_dict("index"))
-    for row in groups[(groups["family"] == "") & ~groups["group"].isin(COMMON_NOISE)].to_dict("records"):
+    is_common = groups["group"].isin((INS_NOISE, PING_NOISE)) | groups["group"].str.endswith(f"_{PING_NOISE}")
+    yield from _common_noise(groups[is_common].set_index("group").to_dict("index"))
+    for row in groups[(groups["family"] == "") & ~is_common].to_dict("records"):
         factor, cut_share = row["variance_factor"], row["cut"] / max(row["count"], 1)
-        name = GROUP_WORDS[row["group"]]
+        name = _group_words(row["group"])
         if factor > MAX_VARIANCE_FACTOR or factor < 1 / MAX_VARIANCE_FACTOR:
             yield Statement(
                 ReasonCode.NOISE_OFF_SIGMAS,
@@ -66,21 +67,33 @@ def unexpected_noise(groups: pd.DataFrame) -> Iterator[Statement]:
             )
 
 
+def _group_words(group: str) -> str:
+    """Return in words a group of a sensor's observations; a further head of the sonar is named.
+
+    >>> _group_words("mbes_vertical"), _group_words("mbes_2_vertical")
+    ('soundings on vertical faces', 'soundings of mbes_2 on vertical faces')
+    """
+    head, _, kind = group.rpartition("_")
+    return GROUP_WORDS.get(group, f"soundings of {head} on {kind} faces")
+
+
 def _common_noise(rows: Mapping[Any, Mapping[Any, Any]]) -> Iterator[Statement]:
     """Yield a warning for unexpected noise that is common to an epoch's points; ``rows``: by group."""
-    ins = rows.get("ins_white", {"variance_factor": 1.0, "sigma": 0.0})
+    ins = rows.get(INS_NOISE, {"variance_factor": 1.0, "sigma": 0.0})
     if ins["variance_factor"] > MAX_INS_VARIANCE_FACTOR:
         words = (
             f"the INS's poses scatter from record to record {np.sqrt(ins['variance_factor']):.1f} times as much as "
             "ins.white says: its filter, or the laser's clock"
         )
         yield Statement(ReasonCode.INS_NOISE_ABOVE_SETTINGS, words)
-    if "ping" in rows:
-        ping = rows["ping"]
+    for group, ping in rows.items():
+        if group == INS_NOISE:
+            continue
         excess = ping["variance_factor"] - ins["variance_factor"]
         if excess > max(MAX_PING_EXCESS, CERTAIN * np.hypot(ping["sigma"], ins["sigma"])):
+            whole = "whole pings" if group == PING_NOISE else f"whole pings of {group.removesuffix(f'_{PING_NOISE}')}"
             words = (
-                f"whole pings scatter {np.sqrt(ping['variance_factor']):.1f} times as much as ins.white says: the "
+                f"{whole} scatter {np.sqrt(ping['variance_factor']):.1f} times as much as ins.white says: the "
                 "sonar's clock, or stabilised beams; the sigmas allow for it"
             )
             yield Statement(ReasonCode.PING_NOISE_ABOVE_SETTINGS, words)

@@ -10,13 +10,13 @@ import numpy as np
 
 from pipeline.artefacts.catalogue.target import FACES, PLANES
 from pipeline.artefacts.from_tables import family_names, horizontal_families, normal_of
+from pipeline.errors import ConfigError
 from pipeline.maths.geometry.planes import angle_between
 from pipeline.results.answer_text import answer_sentence, visible_sentence
 from pipeline.results.finished_run import FinishedRun
 from pipeline.results.mount_difference import Row, is_same_result, mount_difference
 from pipeline.results.units import Tolerances
 from pipeline.run import manifest
-from pipeline.run.results import Tables
 
 PLACE = ("origin", "azimuth_deg", "water_level_m")  # settings of a target that do not concern its shape
 NO_TOLERANCES = Tolerances()
@@ -56,6 +56,41 @@ def run_difference(first: FinishedRun, second: FinishedRun, tolerances: Toleranc
     return difference
 
 
+def difference_by_head(
+    first: FinishedRun, second: FinishedRun, tolerances: Tolerances = NO_TOLERANCES
+) -> dict[str, Any]:
+    """Return the difference of two runs as :func:`run_difference`; of a sonar with several heads, head by head.
+
+    The keys of the first head's difference are those of a single head. ``heads`` has that of every head, with its
+    name; it is absent for a single head.
+
+    Raises
+    ------
+    ConfigError
+        The runs have different numbers of heads.
+    """
+    if first.heads != second.heads:
+        names = [", ".join(run.heads) for run in (first, second)]
+        raise ConfigError(
+            f"the runs have different heads, {first.path} {names[0]}, and {second.path} {names[1]}; name two runs of "
+            "the same sonar"
+        )
+    by_head = [
+        {"name": head} | run_difference(first.of_head(head), second.of_head(head), tolerances) for head in first.heads
+    ]
+    difference = {key: value for key, value in by_head[0].items() if key != "name"}
+    if len(by_head) == 1:
+        return difference
+    planes = [
+        row | {"sensor": one["name"] if row["sensor"] == "mbes" else row["sensor"]}
+        for one in by_head
+        for row in one["planes"]
+        if row["sensor"] == "mbes" or one is by_head[0]
+    ]
+    settings = list(_changes(_computed_with(first), _computed_with(second)))
+    return difference | {"config": settings, "planes": planes, "heads": by_head}
+
+
 def _computed_with(run: FinishedRun) -> dict[str, Any]:
     """Return the settings that a result depends on: all but ``about``, which only the certificate shows."""
     return {key: value for key, value in run.settings.as_json().items() if key != "about"}
@@ -93,10 +128,10 @@ def _plane_changes(first: FinishedRun, second: FinishedRun, not_compared: list[s
         not_compared.append(f"planes: the targets differ ({', '.join(f'target.{name}' for name in differing)})")
         return
     tables = []
-    faces = Tables(first.path).table(FACES)
+    faces = first.tables.table(FACES)
     upright = [name for name in family_names(faces.loc[faces["one_plane"]]) if name not in horizontal_families(faces)]
     for run in (first, second):
-        rows = Tables(run.path).table(PLANES).query("`pass` == -1").to_dict("records")
+        rows = run.tables.table(PLANES).query("`pass` == -1").to_dict("records")
         tables.append({(row["sensor"], row["plane"]): row for row in rows})
     same_mount = first.settings.session.sonar.mount == second.settings.session.sonar.mount
     if not same_mount:

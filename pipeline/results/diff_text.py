@@ -17,13 +17,19 @@ FACE_KEYS = "target.faces."
 
 def difference_text(difference: Mapping[str, Any]) -> str:
     """Return the difference as text for the screen, the answer first. Values that are equal in both are not listed."""
-    lines = [*answer_lines(difference), ""]
+    heads = difference.get("heads", [])
+    if heads:
+        lines = [line for head in heads for line in (f"{head['name']}:", *(f"  {one}" for one in answer_lines(head)))]
+    else:
+        lines = list(answer_lines(difference))
+    lines.append("")
     lines += [
         f"{key}: {difference[key]['session']} ({translated(difference[key]['verdict'])}), {difference[key]['run']}"
         for key in ("a", "b")
     ]
-    if any(row["difference"] for row in difference["parameters"]):
-        lines += ["", *_parameter_table(difference["parameters"])]
+    for head in heads or [difference]:
+        if any(row["difference"] for row in head["parameters"]):
+            lines += ["", *_parameter_table(head["parameters"], head.get("name", "mount"))]
     inputs = difference["inputs"]
     if inputs:
         new, gone = (sum(row[key] is None for row in inputs) for key in ("a", "b"))
@@ -40,7 +46,8 @@ def difference_text(difference: Mapping[str, Any]) -> str:
         ]
     if difference["planes"]:
         lines += ["", *_plane_table(difference["planes"])]
-    lines += [f"not compared: {why}" for why in difference["not_compared"]]
+    why = [one for head in heads or [difference] for one in head["not_compared"]]
+    lines += [f"not compared: {one}" for one in dict.fromkeys(why)]
     return "\n".join(lines)
 
 
@@ -57,7 +64,7 @@ def _plane_table(planes: Sequence[Row]) -> list[str]:
     return text_table("<16>12>14>14", ("planes, b - a", "turned", "distance", "rms"), rows)
 
 
-def _parameter_table(parameters: Sequence[Row]) -> list[str]:
+def _parameter_table(parameters: Sequence[Row], title: str) -> list[str]:
     rows = [
         (
             f"  {row['parameter']}",
@@ -69,7 +76,7 @@ def _parameter_table(parameters: Sequence[Row]) -> list[str]:
         )
         for row in parameters
     ]
-    heads = ("mount, b - a", "difference", "sigma", "in sigmas", "found from")
+    heads = (f"{title}, b - a", "difference", "sigma", "in sigmas", "found from")
     return text_table("<16>14>14>12>14  <1", heads, rows)
 
 

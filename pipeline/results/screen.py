@@ -33,7 +33,8 @@ def summary(calibration: Mapping[str, Any]) -> str:
     lines += [f"  not good enough: {', '.join(held)}"] if colon else []
     lines += _indented(f"warning: {warning}" for warning in calibration["warnings"])
     sensor = calibration.get("calibrated", "mbes")
-    lines += ["", *_mount_table(calibration, sensor)]
+    for head in calibration.get("heads") or [calibration[sensor] | {"coarse": calibration["coarse"], "name": sensor}]:
+        lines += ["", *_mount_table(head, calibration)]
     block = calibration[sensor]
     use = "The calibrated values replace the coarse ones; 'change' is the difference: never apply both."
     lines += ["", "Do not use these values." if rejected else use]
@@ -56,10 +57,12 @@ def _indented(sentences: Iterable[str]) -> list[str]:
     return [line for sentence in sentences for line in wrapped(sentence, "  ", "    ")]
 
 
-def _mount_table(calibration: Mapping[str, Any], sensor: str) -> list[str]:
-    """Return the text lines of the mount's table: coarse and calibrated values, their differences and sigmas."""
-    block, coarse = calibration[sensor], calibration["coarse"]["mount"]
-    rows = []
+def _mount_table(block: Mapping[str, Any], calibration: Mapping[str, Any]) -> list[str]:
+    """Return the text lines of a mount's table: coarse and calibrated values, their differences and sigmas.
+
+    ``block``: the sensor's, or the head's, with its name and its coarse mount.
+    """
+    coarse, rows = block["coarse"]["mount"], []
     for parameter, _, key, unit_of_setting in PARAMETERS:
         unit = "°" if unit_of_setting == "deg" else unit_of_setting
         total, change = "-", "-"
@@ -72,7 +75,7 @@ def _mount_table(calibration: Mapping[str, Any], sensor: str) -> list[str]:
         rows.append((parameter, f"{coarse[key]:.4f} {unit}", total, change, sigma, sigma_total))
     computed = "computed" if calibration["verdict"] == "rejected" else "calibrated"
     result = f"(result: {calibration['result']})"
-    heads = (f"{sensor} mount", "coarse", computed, "change", "sigma", "total", result)
+    heads = (f"{block['name']} mount", "coarse", computed, "change", "sigma", "total", result)
     return text_table("<12>12>14>14>12>12   <1", heads, rows)
 
 

@@ -12,10 +12,10 @@ from pipeline.config.stage_settings import stage_config
 from pipeline.errors import ArtefactError, RawDataError
 from pipeline.run import folder, manifest, provenance
 from pipeline.run.digests import Digests
-from pipeline.run.freshness import Run, key_of, raw_digests_now, raw_of
+from pipeline.run.freshness import Run, inputs_of, key_of, raw_digests_now, raw_of
 from pipeline.run.kept_results import keep_accepted
 from pipeline.run.stage_files import make_folders, read_input, rows_to_map, write_outputs
-from pipeline.run.stage_protocol import declared, evaluate, inputs_in, name_of
+from pipeline.run.stage_protocol import declared, evaluate, name_of
 
 
 def execute_stage(this: Run, stage: ModuleType) -> None:
@@ -28,7 +28,7 @@ def execute_stage(this: Run, stage: ModuleType) -> None:
     partial = folder.partial(target)
     key = key_of(this, stage)
     config = stage_config(stage.Config, this.settings.resolved())
-    inputs = stage.Inputs(**{name: read_input(this, marker) for name, marker in inputs_in(this.stages, stage).items()})
+    inputs = stage.Inputs(**{name: read_input(this, marker) for name, marker in inputs_of(this, stage).items()})
     remove(partial)
     try:
         streams = make_folders(partial, stage)

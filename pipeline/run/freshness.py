@@ -7,7 +7,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from pipeline.artefacts.schema import Artefact, Document, Provenance, RawFiles
+from pipeline.artefacts.schema import Artefact, Document, OfFurtherHeads, Provenance, RawFiles
+from pipeline.config.heads import HEADS
 from pipeline.config.stage_settings import plain_settings, stage_config
 from pipeline.errors import ArtefactError, RawDataError
 from pipeline.readers import dispatch
@@ -15,10 +16,11 @@ from pipeline.run import manifest, provenance
 from pipeline.run.digests import Digests
 from pipeline.run.progress import Progress
 from pipeline.run.settings import Settings
-from pipeline.run.stage_protocol import inputs_in, name_of
+from pipeline.run.stage_protocol import Marker, inputs_in, name_of
 from pipeline.run.workers import SERIAL, Workers
 
-SENSORS = ("ins", "laser", "mbes")
+SENSORS = ("ins", "laser", *HEADS)
+OF_HEADS = "heads"  # folder in a run folder with the runs of the sonar's further heads
 EMPTY = hashlib.sha256().hexdigest()  # the digest of every empty file; the readers report empty files
 
 
@@ -33,6 +35,7 @@ class Run:
     workers: Workers = SERIAL
     progress: Progress = dataclasses.field(default_factory=lambda: Progress(quiet=True))
     raw: dict[str, dict[str, str]] = dataclasses.field(default_factory=dict)  # first digests, by sensor
+    heads: dict[str, "Run"] = dataclasses.field(default_factory=dict)  # the runs of the sonar's further heads, by name
 
     def folder(self, stage: str) -> Path:
         """Return the stage's folder."""
@@ -69,17 +72,40 @@ def key_of(this: Run, stage: ModuleType) -> manifest.Key:
     """Return the key (everything on which the result depends) that the stage would have if it ran now."""
     raw: dict[str, str] = {}
     inputs: dict[str, str] = {}
-    for marker in inputs_in(this.stages, stage).values():
+    for marker in inputs_of(this, stage).values():
         if isinstance(marker, RawFiles):
             raw |= raw_of(this, marker.sensor)
         elif isinstance(marker, Provenance):
             raw |= all_raw(this)
+        elif isinstance(marker, OfFurtherHeads):
+            for head, run in this.heads.items():
+                name = f"{OF_HEADS}/{head}/{marker.artefact.owner}/{marker.artefact.name}"
+                inputs[name] = _artefact_digest(run, marker.artefact)
         else:
             inputs[f"{marker.owner}/{marker.name}"] = _artefact_digest(this, marker)
     config = plain_settings(vars(stage_config(stage.Config, this.settings.resolved())))
     if "svp" in (config.get("mbes") or {}):
         raw |= cast_digest(this)
     return manifest.Key(config, raw, inputs, provenance.source_digests(stage), provenance.library_versions())
+
+
+def inputs_of(this: Run, stage: ModuleType) -> dict[str, Marker]:
+    """Return the artefacts that a stage reads in this run, by field.
+
+    An optional table is left out if its stage has not written it; the stage then gets None.
+    """
+    optional = {field.name for field in dataclasses.fields(stage.Inputs) if field.default is None}
+    return {
+        name: marker
+        for name, marker in inputs_in(this.stages, stage).items()
+        if name not in optional or not isinstance(marker, Artefact) or _is_written(this, marker)
+    }
+
+
+def _is_written(this: Run, marker: Artefact) -> bool:
+    """Return whether a stage's result has an artefact; also true as long as the stage has no result."""
+    owner = manifest.read_manifest(this.folder(marker.owner))
+    return owner is None or file_name(marker) in manifest.artefact_digests(owner.outputs)
 
 
 def raw_of(this: Run, sensor: str) -> dict[str, str]:
@@ -119,14 +145,17 @@ def raw_digests(digests: Digests, root: Path, sensor: str, settings: Any) -> dic
 
 
 def cast_digest(this: Run) -> dict[str, str]:
-    """Return the digest of the cast's file by name; empty without a file. The cast itself is in the settings."""
-    used = getattr(getattr(this.settings.session, "mbes", None), "svp_from", None)
-    if used is None:
-        return {}
-    (digest,) = this.digests.of([this.settings.session_folder / used.file])
-    if digest != used.sha256:
-        raise RawDataError(f"{used.file}: is not the cast that this run was made with; run poolcal run again")
-    return {used.file: digest}
+    """Return the digest of the cast's file by name; empty without a file. The cast itself is in the settings.
+
+    The heads of a sonar may name different files, if these have the same cast.
+    """
+    digests = {}
+    for head in this.settings.session.heads.values():
+        if (used := head.svp_from) is not None:
+            (digests[used.file],) = this.digests.of([this.settings.session_folder / used.file])
+            if digests[used.file] != used.sha256:
+                raise RawDataError(f"{used.file}: is not the cast that this run was made with; run poolcal run again")
+    return digests
 
 
 def _artefact_digest(this: Run, marker: Artefact | Document) -> str:

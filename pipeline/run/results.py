@@ -60,8 +60,16 @@ class Tables:
         return {name: np.concatenate([piece[name] for piece in pieces]) for name in columns}, step
 
 
-def calibration(run: Path) -> dict[str, Any]:
-    """Return the content of RUN/report/calibration.json."""
+def calibration(run: Path, several_heads: bool = False) -> dict[str, Any]:
+    """Return the content of RUN/report/calibration.json.
+
+    Parameters
+    ----------
+    run
+        The run folder.
+    several_heads
+        False: refuse the run of a sonar with several heads. Its keys that are not in ``heads`` are the first head's.
+    """
     path = run / "report" / "calibration.json"
     if run.is_file():
         raise ConfigError(f"{run}: is a file; RUN is a run folder, and stands first")
@@ -72,6 +80,11 @@ def calibration(run: Path) -> dict[str, Any]:
         raise ArtefactError(f"{path}: cannot be read ({reason}); run poolcal run again") from error
     if not isinstance(content, dict) or content.get("verdict") not in ("accepted", "rejected"):
         raise ArtefactError(f"{path}: holds no verdict; run poolcal run again")
+    if not several_heads and len(content.get("heads", ())) > 1:
+        raise ConfigError(
+            f"{run}: is the run of a sonar with {len(content['heads'])} heads, and this command takes one of a single "
+            "head; poolcal report, export --head and diff take several"
+        )
     return content
 
 

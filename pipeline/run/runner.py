@@ -10,13 +10,14 @@ from pathlib import Path
 from types import ModuleType
 
 from pipeline.artefacts.memory import give_back_memory
+from pipeline.atomic_files import remove
 from pipeline.config.session import Calibrated
-from pipeline.errors import ArtefactError
+from pipeline.errors import ArtefactError, ConfigError
 from pipeline.run import folder, manifest
 from pipeline.run.digests import Digests
 from pipeline.run.execute import execute_stage
 from pipeline.run.found_target import remembered_target
-from pipeline.run.freshness import Run, out_of_date
+from pipeline.run.freshness import OF_HEADS, Run, out_of_date
 from pipeline.run.other_session import refuse_other_session
 from pipeline.run.progress import Progress
 from pipeline.run.settings import (
@@ -27,7 +28,7 @@ from pipeline.run.settings import (
     refuse_shared_folder,
     write_settings,
 )
-from pipeline.run.stage_protocol import name_of
+from pipeline.run.stage_protocol import name_of, of_each_head
 from pipeline.run.workers import SERIAL, Workers
 
 
@@ -71,21 +72,35 @@ def run(
     """
     names, progress = [name_of(stage) for stage in stages], progress or Progress(quiet=True)
     find = partial(remembered_target, run_folder, names, session_folder, workers=workers, progress=progress)
-    settings = load_settings(session_folder, config_path, calibrated, find)
+    settings = load_settings(session_folder, config_path, calibrated, find, several_heads=True)
     refuse_shared_folder(run_folder, session_folder)
     with folder.locked(run_folder, names):
         refuse_other_sensor(run_folder, calibrated)
-        this = _open(run_folder, settings, names, workers, progress)
+        this = _open(run_folder, settings, stages, workers, progress)
         if not overwrite:
             refuse_other_session(this, names)
         write_settings(run_folder, settings)
-        first = not any(manifest.read_manifest(this.folder(name)) for name in names)
+        _remove_absent_heads(this)
         had_to_run = []
-        for stage in stages:
-            if _bring_up_to_date(this, stage, first):
-                had_to_run.append(name_of(stage))
-                finished(name_of(stage))
-        return had_to_run
+        for head, run in this.heads.items():
+            with folder.locked(run.path, run.stages):
+                write_settings(run.path, run.settings)
+                done = _bring_all_up_to_date(run, of_each_head(stages), finished)
+                had_to_run += [f"{head}/{name}" for name in done]
+        return had_to_run + _bring_all_up_to_date(this, stages, finished)
+
+
+def _bring_all_up_to_date(
+    this: Run, stages: Sequence[ModuleType], finished: Callable[[str], object]
+) -> list[str]:
+    """Bring stages up to date, and return the names of those that had to be run."""
+    first = not any(manifest.read_manifest(this.folder(name_of(stage))) for stage in stages)
+    had_to_run = []
+    for stage in stages:
+        if _bring_up_to_date(this, stage, first):
+            had_to_run.append(name_of(stage))
+            finished(name_of(stage))
+    return had_to_run
 
 
 def run_stage(
@@ -125,7 +140,11 @@ def run_stage(
         settings = read_settings(run_folder)
     refuse_shared_folder(run_folder, settings.session_folder)
     with folder.locked(run_folder, names):
-        this = _open(run_folder, settings, names, workers, progress)
+        this = _open(run_folder, settings, stages, workers, progress)
+        if this.heads:
+            raise ConfigError(
+                f"{run_folder}: its session has {len(this.heads) + 1} heads, whose stages run together: use poolcal run"
+            )
         if new:
             refuse_other_session(this, names)
         write_settings(run_folder, settings)
@@ -136,26 +155,41 @@ def run_stage(
 
 
 def _open(
-    path: Path, settings: Settings, stages: Sequence[str], workers: Workers, progress: Progress | None
+    path: Path, settings: Settings, stages: Sequence[ModuleType], workers: Workers, progress: Progress | None
 ) -> Run:
+    """Return a run folder in use, with the runs of the sonar's further heads."""
     path = path.absolute()  # workers of a cluster have another working directory
-    digests = Digests(path / folder.DIGESTS, workers.here)
+    digests, heads = Digests(path / folder.DIGESTS, workers.here), list(settings.session.heads)[1:]
     return Run(
         path=path,
         settings=settings,
         digests=digests,
-        stages=tuple(stages),
+        stages=tuple(name_of(stage) for stage in stages),
         workers=workers,
         progress=progress or Progress(quiet=True),
+        heads={
+            head: _open(path / OF_HEADS / head, settings.of_head(head), of_each_head(stages), workers, progress)
+            for head in heads
+        },
     )
+
+
+def _remove_absent_heads(this: Run) -> None:
+    """Remove the runs of heads that the session does not have any more."""
+    for path in sorted((this.path / OF_HEADS).glob("*")):
+        if path.name not in this.heads:
+            remove(path)
+    if not this.heads:
+        remove(this.path / OF_HEADS)
 
 
 def _bring_up_to_date(this: Run, stage: ModuleType, first: bool = False) -> bool:
     """Run the stage if it is out of date; return whether it was. In a folder's ``first`` run no reasons are printed."""
-    name = name_of(stage)
+    place = this.folder(name_of(stage))
+    name = name_of(stage) if this.path.parent.name != OF_HEADS else f"{this.path.name}/{name_of(stage)}"
     reasons = out_of_date(this, stage)
     if not reasons:
-        folder.touch(this.folder(name))
+        folder.touch(place)
         this.progress.note(f"{name}: up to date")
         return False
     if not first:
@@ -163,7 +197,7 @@ def _bring_up_to_date(this: Run, stage: ModuleType, first: bool = False) -> bool
     with this.progress.stage(name):
         execute_stage(this, stage)
     give_back_memory()
-    for line in _losses(manifest.read_manifest(this.folder(name))):
+    for line in _losses(manifest.read_manifest(place)):
         this.progress.note(f"{name}: {line}")
     return True
 

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from pipeline.atomic_files import write_text
 from pipeline.config.about import About
 from pipeline.config.fill_in import refuse_unfilled
 from pipeline.config.found import Found
+from pipeline.config.heads import HEADS, heads_apart
 from pipeline.config.load import pool_in, session_in, session_yaml, stated_keys
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import Calibrated, Mbes, SessionConfig
@@ -68,6 +69,10 @@ class Settings:
         except ConfigError:
             return True
 
+    def of_head(self, head: str) -> "Settings":
+        """Return the settings of a run as if the session had this head of the sonar alone."""
+        return replace(self, session=self.session.alone(head))
+
     def as_json(self) -> dict[str, Any]:
         """Return the settings as plain values, defaults filled in."""
         return {**self.pool.model_dump(mode="json"), **self.session.model_dump(mode="json")}
@@ -78,6 +83,7 @@ def load_settings(
     config_path: Path,
     calibrated: Calibrated | None = "mbes",
     find: Callable[[SessionConfig, Found], Mapping[str, Any]] | None = None,
+    several_heads: bool = False,
 ) -> Settings:
     """Read and check both YAML files, each of them once: a file that is changed meanwhile gives no mixture.
 
@@ -92,11 +98,13 @@ def load_settings(
         one, otherwise the laser.
     find
         Function that finds a target of the kind "found" in the session's files; None: such a target is refused.
+    several_heads
+        False: refuse a session with several heads of the sonar.
     """
     config = YamlFile.read(config_path)
     files = {"session": YamlFile.read(session_yaml(session_folder)), "config": config}
     refuse_unfilled(files.values())
-    session = session_in(files["session"], with_cast)
+    session = session_in(files["session"], with_cast, several_heads or calibrated == "laser")
     if (calibrated or session.calibrated) == "laser":
         refuse_found_target(config)
     pool = pool_in(config, None if find is None else partial(find, session))
@@ -106,14 +114,17 @@ def load_settings(
         raise ConfigError(f"{config_path}: {error}") from error
     refuse_unknown_faces(pool, config_path)
     if calibrated == "laser":
-        session = session.model_copy(update={"mbes": None})
+        session = session.model_copy(update=dict.fromkeys(HEADS))
     elif calibrated == "mbes" and session.calibrated == "laser":
         where = session_folder / SESSION_YAML
         raise ConfigError(f"{where}: mbes: is missing; add it (poolcal laser calibrates the laser without a sonar)")
     if session.mbes is not None:
         refuse_shallow_cast(pool.target, session.mbes, session_folder / SESSION_YAML)
     digests = {name: file.sha256 for name, file in files.items()}
-    stated = {name: stated_keys(file.content) for name, file in files.items()}
+    stated = {
+        "session": stated_keys(heads_apart(files["session"].content, SESSION_YAML)),
+        "config": stated_keys(config.content),
+    }
     return Settings(session_folder.resolve(), pool, session, digests, stated)
 
 

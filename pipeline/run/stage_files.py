@@ -7,13 +7,13 @@ from types import ModuleType
 from typing import Any
 
 from pipeline.artefacts import parquet
-from pipeline.artefacts.schema import Artefact, Document, Provenance, RawFiles
+from pipeline.artefacts.schema import Artefact, Document, OfFurtherHeads, Provenance, RawFiles
 from pipeline.artefacts.streams import EMPTY_STREAM, Chunk, ParquetPart, Part, Stream, only, pieces
 from pipeline.atomic_files import write_text, writing
 from pipeline.readers import dispatch
 from pipeline.run import manifest, provenance
 from pipeline.run.freshness import Run, all_raw
-from pipeline.run.stage_protocol import declared, is_stream, sources
+from pipeline.run.stage_protocol import Marker, declared, is_stream, sources
 from pipeline.run.workers import Stopped
 
 
@@ -40,8 +40,13 @@ def rows_to_map(this: Run, stage: ModuleType) -> int | None:
     return total
 
 
-def read_input(this: Run, marker: Artefact | Document | RawFiles | Provenance) -> Any:
-    """Return a field of a stage's Inputs: a table, a text, a stream that is not read yet, or the run's provenance."""
+def read_input(this: Run, marker: Marker) -> Any:
+    """Return a field of a stage's Inputs: a table, a text, a stream that is not read yet, or the run's provenance.
+
+    Of further heads of the sonar it is a mapping by head.
+    """
+    if isinstance(marker, OfFurtherHeads):
+        return {head: read_input(run, marker.artefact) for head, run in this.heads.items()}
     if isinstance(marker, Provenance):
         return {"inputs": all_raw(this), "software": provenance.library_versions()}
     if isinstance(marker, RawFiles):

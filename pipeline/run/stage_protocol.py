@@ -12,17 +12,17 @@ optional output that is None is not written.
 """
 
 import dataclasses
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any, get_type_hints
 
 from pipeline.artefacts.parquet import from_arrow, to_arrow
-from pipeline.artefacts.schema import Artefact, Document, Provenance, RawFiles
+from pipeline.artefacts.schema import Artefact, Document, OfFurtherHeads, Provenance, RawFiles
 from pipeline.artefacts.sinks import MemorySink, Sink, Written
 from pipeline.artefacts.streams import EMPTY_STREAM, Mapper, Part, Stream, serial
 
-Marker = Artefact | RawFiles | Document | Provenance
+Marker = Artefact | RawFiles | Document | Provenance | OfFurtherHeads
 
 
 def name_of(stage: ModuleType) -> str:
@@ -35,7 +35,7 @@ def declared(fields_of: type) -> dict[str, Marker]:
     artefacts: dict[str, Marker] = {}
     for name, hint in get_type_hints(fields_of, include_extras=True).items():
         markers = [m() if m is Provenance else m for m in getattr(hint, "__metadata__", ())]
-        markers = [m for m in markers if isinstance(m, (Artefact, RawFiles, Document, Provenance))]
+        markers = [m for m in markers if isinstance(m, Marker)]
         if len(markers) != 1:
             raise TypeError(f"{fields_of.__module__}.{fields_of.__name__}.{name} must be annotated with one artefact")
         artefacts[name] = markers[0]
@@ -53,6 +53,14 @@ def inputs_in(stages: Collection[str], stage: ModuleType) -> dict[str, Marker]:
         for name, marker in declared(stage.Inputs).items()
         if not (name in optional and isinstance(marker, Artefact) and marker.owner not in stages)
     }
+
+
+def of_each_head(stages: Sequence[ModuleType]) -> Sequence[ModuleType]:
+    """Return the stages that run once for each further head: up to the last whose results another stage reads so."""
+    read = (marker for stage in stages for marker in declared(stage.Inputs).values())
+    owners = {marker.artefact.owner for marker in read if isinstance(marker, OfFurtherHeads)}
+    last = max((number for number, stage in enumerate(stages) if name_of(stage) in owners), default=-1)
+    return stages[: last + 1]
 
 
 def is_stream(marker: Marker) -> bool:

@@ -8,9 +8,9 @@ from types import ModuleType
 from pipeline.errors import PoolcalError
 from pipeline.run import folder, manifest
 from pipeline.run.digests import Digests
-from pipeline.run.freshness import Run, digests_now, key_of
+from pipeline.run.freshness import OF_HEADS, Run, digests_now, key_of
 from pipeline.run.settings import RUN_YAML, read_settings
-from pipeline.run.stage_protocol import name_of
+from pipeline.run.stage_protocol import name_of, of_each_head
 from pipeline.run.workers import SERIAL, Workers
 
 
@@ -29,8 +29,19 @@ def problems_of_run(stages: Sequence[ModuleType], run_folder: Path, workers: Wor
     settings = read_settings(run_folder)
     with folder.reading(run_folder):
         names = tuple(name_of(stage) for stage in stages)
-        this = Run(run_folder, settings, Digests(None, workers.here), names, workers)
-        return [f"{name_of(stage)}: {problem}" for stage in stages for problem in _problems(this, stage)]
+        digests = Digests(None, workers.here)
+        heads = {
+            head: Run(run_folder / OF_HEADS / head, settings.of_head(head), digests, names, workers)
+            for head in list(settings.session.heads)[1:]
+        }
+        this = Run(run_folder, settings, digests, names, workers, heads=heads)
+        of_heads = [
+            f"{head}/{name_of(stage)}: {problem}"
+            for head, run in heads.items()
+            for stage in of_each_head(stages)
+            for problem in _problems(run, stage)
+        ]
+        return of_heads + [f"{name_of(stage)}: {problem}" for stage in stages for problem in _problems(this, stage)]
 
 
 def _problems(this: Run, stage: ModuleType) -> Iterator[str]:

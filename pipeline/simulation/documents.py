@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.config.heads import HEADS
 from pipeline.config.mount import Mount
 from pipeline.config.pool import AsBuilt
 from pipeline.gps_time import WEEK_NS
@@ -30,7 +31,7 @@ def session_text(scenario: Scenario, movement: Movement, seed: int) -> _Text:
     seed : int
         Seed of the coarse mounts' errors.
     """
-    ins, laser, mbes = scenario.ins, scenario.laser, scenario.mbes
+    ins, laser = scenario.ins, scenario.laser
     first_ns = movement.ins_runs_ns(0)[0]
     ins_block: _Text = {"files": [f"ins/*.{INS_SUFFIX[ins.format]}"]}
     ins_block["format"] = "sbet" if ins.format == "sbet" else "novatel"
@@ -43,23 +44,31 @@ def session_text(scenario: Scenario, movement: Movement, seed: int) -> _Text:
         laser_block["gps_week"] = movement.starts_ns[0] // WEEK_NS
     laser_block |= {"frame": laser.frame, "mount": coarse_mount(laser, seed).model_dump()}
     laser_block["latency_s"] = laser.latency_declared_s
-    mbes_block: _Text = {
-        "files": [f"mbes/*.{mbes.format}"],
+    if scenario.declare_sigmas:
+        laser_block |= _sigmas(laser.range_sigma_m, laser.angle_sigma_deg)
+    heads = [_head_block(scenario, head, seed) for head in scenario.heads]
+    name = f"{scenario.start_utc[:10]}_{scenario.name}"
+    return {"name": name, "ins": ins_block, "laser": laser_block, "mbes": heads if scenario.further else heads[0]}
+
+
+def _head_block(scenario: Scenario, head: str, seed: int) -> _Text:
+    """Return the block of one head of the sonar, by its name."""
+    mbes = scenario.heads[head]
+    block: _Text = {
+        "files": [f"{head}/*.{mbes.format}"],
         "format": "table" if mbes.format == "parquet" else "r2sonic",
-        "mount": coarse_mount(mbes, seed).model_dump(),
+        "mount": coarse_mount(mbes, seed, HEADS.index(head)).model_dump(),
         "sound_speed_m_s": mbes.sound_speed_true_m_s if mbes.give_true_sound_speed else None,
     }
     if mbes.svp_declared:
-        mbes_block["svp"] = [list(row) for row in mbes.svp_declared]
+        block["svp"] = [list(row) for row in mbes.svp_declared]
     if mbes.give_projector_offset:
-        mbes_block["projector_offset_m"] = list(mbes.projector_offset_m)
-    mbes_block["latency_s"] = mbes.latency_declared_s
+        block["projector_offset_m"] = list(mbes.projector_offset_m)
+    block["latency_s"] = mbes.latency_declared_s
     if scenario.declare_sigmas:
-        laser_block |= _sigmas(laser.range_sigma_m, laser.angle_sigma_deg)
-        mbes_block |= _sigmas(mbes.range_sigma_m, mbes.angle_sigma_deg) | {"beam_deg": list(mbes.beam_deg)}
-        mbes_block["focused"] = [aperture == 0 for aperture in mbes.aperture_m]
-    name = f"{scenario.start_utc[:10]}_{scenario.name}"
-    return {"name": name, "ins": ins_block, "laser": laser_block, "mbes": mbes_block}
+        block |= _sigmas(mbes.range_sigma_m, mbes.angle_sigma_deg) | {"beam_deg": list(mbes.beam_deg)}
+        block["focused"] = [aperture == 0 for aperture in mbes.aperture_m]
+    return block
 
 
 def _sigmas(range_m: float, angle_deg: float) -> _Text:
@@ -86,6 +95,8 @@ def pool_text(scenario: Scenario, movement: Movement) -> _Text:
 def truth_text(scenario: Scenario, movement: Movement, seed: int) -> _Text:
     """Return the truth: true mounts, the error of the sonar's coarse mount, and all settings of the scenario.
 
+    Of several heads of the sonar ``mbes`` is the first; ``heads`` has all.
+
     Parameters
     ----------
     scenario : Scenario
@@ -95,17 +106,18 @@ def truth_text(scenario: Scenario, movement: Movement, seed: int) -> _Text:
     seed : int
         Seed of the session.
     """
-    mbes, mount = scenario.mbes, scenario.mbes.mount
+    mbes = scenario.mbes
     error: Mount = coarse_error(mbes, seed)
+    heads = [
+        {"name": name, **_true_mount(head.mount), "coarse_error": coarse_error(head, seed, number).model_dump()}
+        for number, (name, head) in enumerate(scenario.heads.items())
+    ]
     return {
         "schema": 1,
         "scenario": scenario.name,
         "seed": seed,
-        "mbes": {
-            "mount": mount.model_dump(),
-            "R_body_from_mbes": R_body_from_sensor(mount).as_matrix().tolist(),
-            "lever_arm_m": lever_arm_m(mount).tolist(),
-        },
+        "mbes": _true_mount(mbes.mount),
+        **({"heads": heads} if scenario.further else {}),
         "coarse_error": error.model_dump(),
         "laser": {
             "mount": scenario.laser.mount.model_dump(),
@@ -124,4 +136,13 @@ def truth_text(scenario: Scenario, movement: Movement, seed: int) -> _Text:
             for start, end, distance in zip(movement.starts_ns, movement.ends_ns, movement.distances_m, strict=True)
         ],
         "settings": scenario.model_dump(mode="json"),
+    }
+
+
+def _true_mount(mount: Mount) -> _Text:
+    """Return the true mount of a head: angles and lever arm, and the rotation as a matrix."""
+    return {
+        "mount": mount.model_dump(),
+        "R_body_from_mbes": R_body_from_sensor(mount).as_matrix().tolist(),
+        "lever_arm_m": lever_arm_m(mount).tolist(),
     }

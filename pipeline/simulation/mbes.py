@@ -17,12 +17,13 @@ from pipeline.simulation.water_column import WaterColumn
 RAYS_AT_ONCE = 400_000
 CLOCK_RATE_ERROR = 3.7e-5  # error of the sonar's clock, so that pings never fall into step with the INS
 _SHORTEST_M = 0.5
+OF_NEXT_HEAD = 1000  # more than passes: where the generators of the next head begin
 
 
 def record_mbes(
-    scenario: MbesScenario, movement: Movement, pool: Pool, seed: int
+    scenario: MbesScenario, movement: Movement, pool: Pool, seed: int, head: int = 0
 ) -> tuple[Columns, Columns]:
-    """Simulate the records of the sonar.
+    """Simulate the records of one head of the sonar.
 
     Parameters
     ----------
@@ -34,6 +35,8 @@ def record_mbes(
         Surfaces that its beams meet.
     seed : int
         Seed of the session.
+    head : int
+        Number of the head, from 0: each has noise and a clock of its own.
 
     Returns
     -------
@@ -47,7 +50,7 @@ def record_mbes(
     pings: list[Columns] = []
     first = 1000
     for k in movement.passes:
-        sonar = _SonarPass(scenario, movement, pool, angles, seed=seed, k=k, first_ping=first)
+        sonar = _SonarPass(scenario, movement, pool, angles, seed=seed, k=k, head=head, first_ping=first)
         batch = max(1, RAYS_AT_ONCE // (len(angles) * sonar.beams.rays))
         parts += [sonar.detections(slice(i, i + batch)) for i in range(0, max(len(sonar.t_ns), 1), batch)]
         pings.append({"t_ns": sonar.recorded_ns, "ping": sonar.ping, "pass": np.full(len(sonar.ping), k)})
@@ -68,23 +71,25 @@ class _SonarPass:
         *,
         seed: int,
         k: int,
+        head: int,
         first_ping: int,
     ) -> None:
         self.scenario, self.movement, self.pool, self.k, self.angles_rad = scenario, movement, pool, k, angles_rad
         start_ns, end_ns = movement.sensors_run_ns(k)
         period_s = (1 + CLOCK_RATE_ERROR) / scenario.ping_rate_hz
-        phase = generator(seed, "mbes_clock", k).random()
+        own = k + OF_NEXT_HEAD * head
+        phase = generator(seed, "mbes_clock", own).random()
         self.count = round((end_ns - start_ns) / NS / period_s)
         t_ns = start_ns + np.rint((np.arange(self.count) + phase) * period_s * NS).astype(np.int64)
-        kept = generator(seed, "mbes_drop", k).random(self.count) >= scenario.dropped_ping_share
+        kept = generator(seed, "mbes_drop", own).random(self.count) >= scenario.dropped_ping_share
         self.t_ns: Times = t_ns[kept]
-        jitter_s = scenario.pps_jitter_s * generator(seed, "mbes_pps", k).standard_normal(self.count)[kept]
+        jitter_s = scenario.pps_jitter_s * generator(seed, "mbes_pps", own).standard_normal(self.count)[kept]
         self.recorded_ns: Times = self.t_ns + round(scenario.latency_s * NS) + np.rint(jitter_s * NS).astype(np.int64)
         self.ping = first_ping + np.flatnonzero(kept).astype(np.int64)
         self.beams = BeamBundles(scenario, pool.caster, pool.water_level_m)
         self.R_body_from_mbes = R_body_from_sensor(scenario.mount).as_matrix()
         names = ("range", "angle", "outlier", "surface", "corner", "side_lobe", "image", "ping", "steering")
-        self.random = {name: generator(seed, f"mbes_{name}", k) for name in names}
+        self.random = {name: generator(seed, f"mbes_{name}", own) for name in names}
         self.water = WaterColumn(scenario, self.beams, pool.water_level_m)
         self.echoes = Echoes(scenario, pool, self.beams, self.random)
 

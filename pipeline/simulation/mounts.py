@@ -20,18 +20,28 @@ def lever_arm_m(mount: Mount) -> Floats:
     return np.array([mount.x_m, mount.y_m, mount.z_m])
 
 
-def coarse_error(scenario: LaserScenario | MbesScenario, seed: int) -> Mount:
-    """Return coarse minus true mount: the scenario's ``coarse_error``, or else its two sizes with random signs."""
+def coarse_error(scenario: LaserScenario | MbesScenario, seed: int, head: int = 0) -> Mount:
+    """Return coarse minus true mount: the scenario's ``coarse_error``, or else its two sizes with random signs.
+
+    Parameters
+    ----------
+    scenario : LaserScenario or MbesScenario
+        The laser, or a head of the sonar.
+    seed : int
+        Seed of the session.
+    head : int
+        Number of the head, from 0.
+    """
     if scenario.coarse_error is not None:
         return scenario.coarse_error
     noise = "coarse" if isinstance(scenario, MbesScenario) else "coarse_laser"
-    signs = generator(seed, noise).choice([-1.0, 1.0], 6)
+    signs = generator(seed, noise, head).choice([-1.0, 1.0], 6)
     sizes = [scenario.coarse_angle_deg] * 3 + [scenario.coarse_lever_m] * 3
     names = Mount.model_fields
     return Mount(**{name: float(sign * size) for name, sign, size in zip(names, signs, sizes, strict=True)})
 
 
-def coarse_mount(scenario: LaserScenario | MbesScenario, seed: int) -> Mount:
-    """Return the mount in session.yaml: true mount plus coarse error."""
-    true, error = scenario.mount.model_dump(), coarse_error(scenario, seed).model_dump()
+def coarse_mount(scenario: LaserScenario | MbesScenario, seed: int, head: int = 0) -> Mount:
+    """Return the mount in session.yaml: true mount plus coarse error; parameters as for :func:`coarse_error`."""
+    true, error = scenario.mount.model_dump(), coarse_error(scenario, seed, head).model_dump()
     return Mount(**{name: round(true[name] + error[name], 12) for name in true})

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field, model_validator
 
 from pipeline import CONFIGS
+from pipeline.config.heads import HEADS, WithHeads
 from pipeline.config.quantities import Angle, Length, Lever, Model, NotNegative, Positive
 from pipeline.config.target import Letters, Origin, Target
 from pipeline.config.target_mesh import with_mesh
@@ -70,7 +71,7 @@ class TrackScenario(Model):
     log_between_passes: bool = False  # all instruments run on while the vessel turns and comes back
 
 
-class Scenario(Model):
+class Scenario(WithHeads):
     """A simulated session."""
 
     name: Annotated[str, Field(min_length=1, max_length=200)] = "default"
@@ -86,22 +87,44 @@ class Scenario(Model):
     ins: InsScenario = InsScenario()
     laser: LaserScenario = LaserScenario()
     mbes: MbesScenario = MbesScenario()
+    mbes_2: MbesScenario | None = None  # further heads: mbes is then a list
+    mbes_3: MbesScenario | None = None
+    mbes_4: MbesScenario | None = None
 
     @model_validator(mode="after")
     def _can_be(self) -> "Scenario":
         if self.target.azimuth_deg is None:
             raise ValueError("target.azimuth_deg = null: a simulated target stands at some azimuth; give it")
         height_m = self.track.ins_height_m
-        if height_m + self.mbes.mount.z_m > -0.2 or height_m + self.laser.mount.z_m < 0.2:
-            raise ValueError(
-                f"track.ins_height_m = {height_m} puts the sonar {height_m + self.mbes.mount.z_m:.2f} m and the laser "
-                f"{height_m + self.laser.mount.z_m:.2f} m above the water: it must be 0.2 m below, and 0.2 m above"
-            )
+        for head in self.heads.values():
+            if height_m + head.mount.z_m > -0.2 or height_m + self.laser.mount.z_m < 0.2:
+                raise ValueError(
+                    f"track.ins_height_m = {height_m} puts the sonar {height_m + head.mount.z_m:.2f} m and the laser "
+                    f"{height_m + self.laser.mount.z_m:.2f} m above the water: it must be 0.2 m below, and 0.2 m above"
+                )
         ways_m = {"circle": 2 * pi * self.track.circle_radius_m}
         way_m = min(ways_m.get(course, 2 * self.half_length_m) for course in self.track.courses)
         if way_m / self.track.speed_m_s < 1.0:
             raise ValueError(f"track.speed_m_s = {self.track.speed_m_s}: a pass must last a second or more")
         return self
+
+    @model_validator(mode="after")
+    def _one_water(self) -> "Scenario":
+        for name, head in self.further.items():
+            for key in ("sound_speed_true_m_s", "sound_speed_gradient_1_s", "sound_speed_profile"):
+                if getattr(head, key) != getattr(self.mbes, key):
+                    raise ValueError(f"{name}.{key} is not that of the first head, but all heads are in one water")
+        return self
+
+    @property
+    def heads(self) -> dict[str, MbesScenario]:
+        """The heads of the sonar by name, the first one first."""
+        return {name: head for name in HEADS if (head := getattr(self, name)) is not None}
+
+    @property
+    def further(self) -> dict[str, MbesScenario]:
+        """The heads beside the first, by name."""
+        return {name: head for name, head in self.heads.items() if name != HEADS[0]}
 
     @property
     def half_length_m(self) -> float:

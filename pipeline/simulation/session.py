@@ -5,7 +5,7 @@ import os
 import shutil
 import time
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -29,6 +29,7 @@ from pipeline.simulation.raycast import Pool, RayCaster
 from pipeline.simulation.relief import Relief
 from pipeline.simulation.sbet import sbet_bytes
 from pipeline.simulation.scenario import Scenario, load_scenario
+from pipeline.simulation.scenario_mbes import MbesScenario
 from pipeline.simulation.tables import write_soundings
 
 
@@ -45,6 +46,13 @@ class SimulatedSession:
     ins_rows: list[int]  # first row of each pass, and the number of rows
     laser_rows: list[int]
     pings: Columns  # every ping: t_ns, ping, pass
+    further: dict[str, tuple[Columns, Columns]] = field(default_factory=dict)  # of further heads: as mbes, and pings
+
+    @property
+    def raw(self) -> dict[str, Columns]:
+        """The records of all instruments by sensor."""
+        heads = {name: records for name, (records, _) in self.further.items()}
+        return {"ins": self.ins, "laser": self.laser, "mbes": self.mbes, **heads}
 
 
 def simulate_session(scenario: Scenario, seed: int) -> SimulatedSession:
@@ -79,6 +87,10 @@ def simulate_session(scenario: Scenario, seed: int) -> SimulatedSession:
         ins_rows=ins_rows,
         laser_rows=laser_rows,
         pings=pings,
+        further={
+            name: record_mbes(head, movement, pool, seed, number)
+            for number, (name, head) in enumerate(scenario.further.items(), start=1)
+        },
     )
 
 
@@ -160,7 +172,7 @@ def simulate_to_folder(folder: Path, scenario_path: Path | None, seed: int) -> d
         "truth": truth_path(folder),
         "ins_records": len(simulated.ins["t_ns"]),
         "laser_points": len(simulated.laser["t_ns"]),
-        "soundings": len(simulated.mbes["t_ns"]),
+        "soundings": sum(len(simulated.raw[head]["t_ns"]) for head in scenario.heads),
         "seconds": time.perf_counter() - begin,
     }
 
@@ -175,17 +187,18 @@ def _refuse_existing(folder: Path) -> None:
 
 
 def _write_files(simulated: SimulatedSession, folder: Path, scenario: Scenario) -> None:
-    for name in ("ins", "laser", "mbes"):
+    for name in simulated.raw:
         (folder / name).mkdir()
     _write_ins(simulated, folder / "ins", scenario)
     day = datetime.fromisoformat(scenario.start_utc).date()
     for k in range(len(scenario.track.distances_m)):
         points = _rows(simulated.laser, simulated.laser_rows[k], simulated.laser_rows[k + 1])
         write_las(folder / "laser" / f"pass_{k}.{scenario.laser.format}", points, scenario.laser, day)
-        pings = _rows(simulated.pings, *np.searchsorted(simulated.pings["pass"], [k, k + 1]))
-        first, last = (pings["ping"][[0, -1]] if len(pings["ping"]) else (0, -1))
-        mbes = _rows(simulated.mbes, *np.searchsorted(simulated.mbes["ping"], [first, last + 1]))
-        _write_mbes(mbes, pings, folder / "mbes" / f"pass_{k}.{scenario.mbes.format}", scenario)
+        for head, (mbes, pings) in {"mbes": (simulated.mbes, simulated.pings), **simulated.further}.items():
+            of_pass = _rows(pings, *np.searchsorted(pings["pass"], [k, k + 1]))
+            first, last = (of_pass["ping"][[0, -1]] if len(of_pass["ping"]) else (0, -1))
+            rows = _rows(mbes, *np.searchsorted(mbes["ping"], [first, last + 1]))
+            _write_mbes(rows, of_pass, folder / head, k, scenario.heads[head])
     for name, text in (("session.yaml", simulated.session), ("pool.yaml", simulated.pool)):
         (folder / name).write_text(yaml.safe_dump(text, sort_keys=False), encoding="utf-8")
 
@@ -203,12 +216,13 @@ def _write_ins(simulated: SimulatedSession, folder: Path, scenario: Scenario) ->
         path.write_bytes(novatel_bytes(np.concatenate([before, inspva_bodies(ins)]), form))
 
 
-def _write_mbes(mbes: Columns, pings: Columns, path: Path, scenario: Scenario) -> None:
-    if scenario.mbes.format == "parquet":
+def _write_mbes(mbes: Columns, pings: Columns, folder: Path, k: int, head: MbesScenario) -> None:
+    path = folder / f"pass_{k}.{head.format}"
+    if head.format == "parquet":
         write_soundings(path, mbes)
         return
-    packet = bth0_packets(mbes, pings, fan_angles(scenario.mbes), scenario.mbes)
-    path.write_bytes(xtf_bytes(packet, path.name) if scenario.mbes.format == "xtf" else packet.tobytes())
+    packet = bth0_packets(mbes, pings, fan_angles(head), head)
+    path.write_bytes(xtf_bytes(packet, path.name) if head.format == "xtf" else packet.tobytes())
 
 
 def _rows(columns: Columns, start: int, stop: int) -> Columns:

@@ -58,6 +58,9 @@ def _export(
     although_rejected: Annotated[
         bool, typer.Option("--although-rejected", help="export a rejected run too, marked as such")
     ] = False,
+    head: Annotated[
+        str | None, typer.Option("--head", metavar="NAME", help="of a sonar with several heads: mbes, mbes_2, ...")
+    ] = None,
 ) -> int:
     """Write the mount in another program's form and signs.
 
@@ -68,7 +71,9 @@ def _export(
 
     if show_list:
         return export.print_list()
-    choices = export.Choices(ins_point, ins_turn, order, serial, ins_height, projector_offset, crs, although_rejected)
+    choices = export.Choices(
+        ins_point, ins_turn, order, serial, ins_height, projector_offset, crs, although_rejected, head
+    )
     return export.command(run_folder, target, out, choices)
 
 

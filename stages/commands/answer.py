@@ -25,7 +25,7 @@ def print_result(run: Path) -> int:
     from pipeline.run.results import calibration
     from pipeline.text_table import wrapped
 
-    result = calibration(run)
+    result = calibration(run, several_heads=True)
     note = note_of_run(run, result)
     lines = [summary(result), *(wrapped(f"Note: {note}.") if note else ())]
     return print_answer("\n".join(lines), result["verdict"] == "accepted")
@@ -40,13 +40,20 @@ def say_where(run: Path) -> None:
         say(f"See the recordings: {_command('view', run)}", sys.stdout)
 
 
-def say_next(run: Path) -> None:
-    """Print what comes after an accepted calibration of the sonar: entering its values, and proving that."""
-    lines = [
-        "Next: enter the values in your survey software (poolcal export --list shows all), and prove that:",
-        f"  {_command('export', run)} --to NAME",
-        f"  {_command('check-entry', run)} SOUNDINGS",
-    ]
+def say_next(run: Path, heads: Sequence[str] = ()) -> None:
+    """Print what comes after an accepted calibration of the sonar: entering its values, and proving that.
+
+    ``heads``: names of the sonar's heads, if it has several.
+    """
+    if heads:
+        lines = ["Next: enter the values of each head in your survey software (poolcal export --list shows all):"]
+        lines += [f"  {_command('export', run)} --head {head} --to NAME" for head in heads]
+    else:
+        lines = [
+            "Next: enter the values in your survey software (poolcal export --list shows all), and prove that:",
+            f"  {_command('export', run)} --to NAME",
+            f"  {_command('check-entry', run)} SOUNDINGS",
+        ]
     say("\n".join(lines), sys.stdout)
 
 

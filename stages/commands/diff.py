@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.atomic_files import write_text, writing
+from pipeline.errors import ConfigError
 from pipeline.language.speaking import say
-from pipeline.results.diff import run_difference
+from pipeline.results.diff import difference_by_head
 from pipeline.results.diff_text import difference_text
 from pipeline.results.finished_run import FinishedRun
 from pipeline.results.mount_difference import is_moved
@@ -44,6 +45,8 @@ def command(first: Path, second: Path, tolerances: Tolerances, outputs: DiffOutp
         0: no movement of the mount is shown; 1: it has moved, or the mounts cannot be compared.
     """
     difference = compare_runs(first, second, tolerances)
+    if "heads" in difference and (outputs.html is not None or outputs.rrd is not None):
+        raise ConfigError("--html, --rrd: show one head; of a sonar with several heads there is the text, and --json")
     for option, file in (("--html", outputs.html), ("--rrd", outputs.rrd)):
         refuse_output(option, file, first, second)
     if outputs.html is not None:
@@ -54,11 +57,11 @@ def command(first: Path, second: Path, tolerances: Tolerances, outputs: DiffOutp
         write_two_runs(first, second, difference, outputs.rrd)
     text = json.dumps(difference, indent=1, ensure_ascii=False) if outputs.as_json else difference_text(difference)
     say(text, sys.stdout, as_is=outputs.as_json)
-    return 1 if is_moved(difference) else 0
+    return 1 if any(map(is_moved, difference.get("heads", [difference]))) else 0
 
 
 def compare_runs(first: Path, second: Path, tolerances: Tolerances) -> dict[str, Any]:
-    """Return the difference of two run folders, of :func:`pipeline.results.diff.run_difference`.
+    """Return the difference of two run folders, of :func:`pipeline.results.diff.difference_by_head`.
 
     Parameters
     ----------
@@ -67,7 +70,8 @@ def compare_runs(first: Path, second: Path, tolerances: Tolerances) -> dict[str,
     tolerances
         A mount parameter with a larger difference is listed by name.
     """
-    return run_difference(FinishedRun.read(first, ORDER), FinishedRun.read(second, ORDER), tolerances)
+    before, after = (FinishedRun.read(folder, ORDER, several_heads=True) for folder in (first, second))
+    return difference_by_head(before, after, tolerances)
 
 
 def write_two_runs(first: Path, second: Path, difference: dict[str, Any], path: Path) -> None:

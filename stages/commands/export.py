@@ -43,6 +43,7 @@ class Choices:
     projector_offset: Three | None
     crs: str | None
     although_rejected: bool
+    head: str | None = None  # of a sonar with several
 
 
 def print_list() -> int:
@@ -70,10 +71,16 @@ def command(run_folder: Path | None, name: str | None, out: Path | None, choices
     if name not in CLOUDS:
         target_named(name, "--to")
     calibrated = calibrated_in(run_folder)
-    run = FinishedRun.read(run_folder, names_in(run_folder), calibrated)
+    run = FinishedRun.read(run_folder, names_in(run_folder), calibrated, several_heads=True)
     if name in CLOUDS:
+        if len(run.heads) > 1:
+            raise ConfigError(f"--to {name}: {run_folder} has several heads, whose points are not exported together")
         return _export_points(run, name, out, choices)
     target = target_named(name, "--to")
+    if target.sensor != "laser":
+        run = _of_head(run, choices.head)
+    elif choices.head is not None:
+        raise ConfigError(f"--head: {name} takes the laser's mount; leave it out")
     if choices.crs is not None:
         raise ConfigError(f"--crs: {name} is a mount, and has no CRS; leave it out")
     refuse_output("--out", out, run_folder, run.settings.session_folder, suffix=target.suffix, holds=WRITTEN)
@@ -86,6 +93,15 @@ def command(run_folder: Path | None, name: str | None, out: Path | None, choices
     sensor = SENSOR_WORDS[mounting.sensor]
     say(f"{out}: the {sensor}'s mount for {target.title}; totals, which replace what stands there", sys.stdout)
     return 0
+
+
+def _of_head(run: FinishedRun, head: str | None) -> FinishedRun:
+    """Return the run of one head of the sonar; with several heads it must be named."""
+    if head is None and len(run.heads) > 1:
+        raise ConfigError(f"{run.path}: has {len(run.heads)} heads, {' and '.join(run.heads)}: say which, --head NAME")
+    if head is not None and head not in run.heads:
+        raise ConfigError(f"--head {head!r}: is no head of {run.path}, which has {', '.join(run.heads)}")
+    return run.of_head(head or run.heads[0])
 
 
 def _placed(mounting: Mounting, choices: Choices) -> Mounting:

@@ -12,7 +12,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from queue import SimpleQueue
 
+from pipeline.config.heads import heads_apart, refuse_several
 from pipeline.config.session import Calibrated
+from pipeline.config.yaml_file import SESSION_YAML, YamlFile
 from pipeline.errors import PoolcalError
 from pipeline.fleet.answer import Answer, answer_about
 from pipeline.run.results import calibration
@@ -45,10 +47,12 @@ def answer(request: Request) -> Answer:
     answers: list[Answer] = []
 
     def calibrate() -> int:
-        folder = Path(request.run)
+        folder, session = Path(request.run), Path(request.session)
         options = RunOptions(1, request.executor, Drawings(request.report, request.recordings), overwrite=False)
         try:
-            done = run.calibrate(Path(request.session), Path(request.config), folder, request.sensor, options)
+            if request.sensor == "mbes":
+                _refuse_several_heads(session / SESSION_YAML)
+            done = run.calibrate(session, Path(request.config), folder, request.sensor, options)
             result = calibration(folder)
             answers.append(answer_about(result, done.ran, done.not_drawn))
         except PoolcalError as error:
@@ -63,6 +67,12 @@ def answer(request: Request) -> Answer:
     if status == INTERRUPTED:
         raise KeyboardInterrupt
     return answers[0] if answers else Answer(status, reason=reasons[0])
+
+
+def _refuse_several_heads(path: Path) -> None:
+    """Raise a ConfigError if session.yaml lists several heads: the table of many sessions has the mount of one."""
+    if path.is_file():  # that it is missing is said by the run
+        refuse_several(heads_apart(YamlFile.read(path).content, str(path)), str(path))
 
 
 def main() -> None:

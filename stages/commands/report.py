@@ -30,7 +30,7 @@ def command(run: Path, pdf: Path | None, certificate: bool) -> int:
         raise ConfigError("--certificate: says what the PDF holds; add --pdf FILE")
     settings = read_settings(run)
     refuse_output("--pdf", pdf, run, settings.session_folder, begins=b"%PDF")
-    calibration(run)
+    calibration(run, several_heads=True)
     if settings.is_about_changed():
         again = (
             f"{settings.session_folder / SESSION_YAML}: about has changed since the run, which the page does not show; "

@@ -6,6 +6,7 @@ from pathlib import Path
 from pipeline.config.session import Calibrated
 from pipeline.run import runner
 from pipeline.run.progress import Progress
+from pipeline.run.results import calibration
 from pipeline.run.workers import workers
 from stages import load
 from stages.commands.answer import print_result, say_failures, say_next, say_where
@@ -72,5 +73,5 @@ def calibrate(session: Path, config: Path, run: Path, calibrated: Calibrated, op
     raise_if_interrupted()
     say_where(run)
     if status == 0 and calibrated == "mbes":
-        say_next(run)
+        say_next(run, [str(head["name"]) for head in calibration(run, several_heads=True).get("heads", ())])
     return Done(status, ran, [failure.kind for failure in failures])

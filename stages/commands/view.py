@@ -1,9 +1,11 @@
 """``poolcal view``: show a run's recordings, or two runs side by side, in the Rerun viewer."""
 
+import sys
 from pathlib import Path
 
 from pipeline.atomic_files import temporary_folder
 from pipeline.errors import ConfigError
+from pipeline.language.speaking import say
 from pipeline.results.units import Tolerances
 from pipeline.run.settings import read_settings
 from stages import ORDER
@@ -34,14 +36,21 @@ def command(first: Path, second: Path | None, stage: str | None) -> int:
     if stage is not None and stage not in ORDER:
         raise ConfigError(f"--stage {stage!r}: is no stage; the stages are {', '.join(ORDER)}")
     if second is None:
-        read_settings(first)
+        if len(read_settings(first).session.heads) > 1:
+            say(
+                "Note: the sonar has several heads; the recordings of the stages before adjust show the first alone",
+                sys.stderr,
+            )
         say_failures(draw_missing(first, Drawings(report=False, recordings=True)))
         copy = f"copy {first}/*/*.rrd to a machine with one, or open {first}/report/report.html"
         return show_recordings(recordings_of(first, stage), copy)
     if stage is not None:
         raise ConfigError(f"--stage {stage}: two runs are shown as a whole; leave it out, or name one run")
+    difference = compare_runs(first, second, Tolerances())
+    if "heads" in difference:
+        raise ConfigError(f"{first}: is of a sonar with several heads: two such runs are not shown; see poolcal diff")
     with temporary_folder() as place:
         path = place / "pair.rrd"
-        write_two_runs(first, second, compare_runs(first, second, Tolerances()), path)
+        write_two_runs(first, second, difference, path)
         copy = f"write both by poolcal diff {first} {second} --rrd FILE, and copy that to a machine with one"
         return show_recordings([path], copy)

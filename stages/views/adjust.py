@@ -1,5 +1,7 @@
 """Stage adjust: soundings before and after and in between, residuals as colours, as maps and over time, the boat."""
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -22,7 +24,7 @@ from pipeline.artefacts.catalogue.target import FACES
 from pipeline.artefacts.from_tables import family_names, normal_of, normals_of
 from pipeline.gps_time import NS
 from pipeline.maths.geometry.face_grid import face_axes
-from pipeline.maths.mount_parameters import PARAMETERS
+from pipeline.maths.mount_parameters import N_MOUNT, PARAMETERS
 from pipeline.results.pages.families import styles_of_families
 from pipeline.run.results import Tables
 from pipeline.run.settings import read_settings
@@ -34,7 +36,7 @@ from stages.views.recording import COLOURS, DOT_M, LASER, SONAR, log_curve, text
 Array = NDArray[np.float64]
 Shades = dict[str, tuple[int, int, int]]  # by family
 XYZ = [f"{axis}_target_m" for axis in "xyz"]
-SENSORS = {"laser": LASER, "mbes": SONAR}
+SENSORS = ("laser", "mbes")  # and further heads of the sonar, where a run has them
 PARTS = 20  # of the way from the coarse to the calibrated mount
 MOST_IN_REPLAY = 5000  # points of a family in one of its steps
 
@@ -65,7 +67,8 @@ def log(recording: Any, tables: Tables) -> None:
     """Log soundings before, after and in between, residuals as colours, as maps and over time, boats, and a text."""
     faces, residuals = tables.table(FACES), tables.table(RESIDUALS)
     family = faces["family"].to_numpy()[residuals["face"].to_numpy().astype(int)]
-    span, steps = _span(residuals), _steps(tables, residuals)
+    span = _span(residuals)
+    steps = _steps(tables, residuals, list(span))
     shades = styles_of_families(family_names(faces), COLOURS)
     points = ResidualPoints(residuals, family, span, steps)
     _clouds(recording, tables, points, shades)
@@ -80,20 +83,20 @@ def log(recording: Any, tables: Tables) -> None:
 def _span(residuals: pd.DataFrame) -> dict[str, float]:
     """Return by sensor the residual (m) with the strongest colour: three times the RMS of points with a weight > 0."""
     spans_m = {}
-    for sensor in SENSORS:
+    for sensor in sorted({*SENSORS, *residuals["sensor"].unique()}):
         rows = residuals[(residuals["sensor"] == sensor) & (residuals["weight"] > 0)]
         size = rows["residual_m"].to_numpy(np.float64)
         spans_m[sensor] = max(3 * float(np.sqrt(np.mean(size**2))), 1e-3) if len(size) else 1e-3
     return spans_m
 
 
-def _steps(tables: Tables, residuals: pd.DataFrame) -> dict[str, int]:
+def _steps(tables: Tables, residuals: pd.DataFrame, sensors: Sequence[str]) -> dict[str, int]:
     """Return by sensor the number of observations for one row of table ``residuals``, which is thinned."""
-    total = dict.fromkeys(SENSORS, 0)
+    total = dict.fromkeys(sensors, 0)
     groups = tables.table(GROUPS)
     for sensor, count in groups[groups["family"] != ""].groupby("sensor")["count"].sum().items():
         total[str(sensor)] += int(count)
-    return {s: round(total[s] / max(1, int((residuals["sensor"] == s).sum()))) for s in SENSORS}
+    return {s: round(total[s] / max(1, int((residuals["sensor"] == s).sum()))) for s in sensors}
 
 
 def residual_colours(residual_m: Array, span_m: float) -> NDArray[np.uint8]:
@@ -111,7 +114,7 @@ def _clouds(recording: Any, tables: Tables, points: ResidualPoints, shades: Shad
     # each point is shown on its surface: points in front of it would hide the others, and all would seem to be in front
     normals = {row["family"]: normal_of(row) for row in surfaces}
     solved = bool(np.isfinite(tables.table(ESTIMATE)["value"].to_numpy()[:6]).all())
-    for sensor in SENSORS:
+    for sensor in points.span_m:
         of_sensor = (points.residuals["sensor"] == sensor).to_numpy()
         step = rr.AnyValues(one_in=points.steps[sensor])
         for name, colour in shades.items():
@@ -121,11 +124,12 @@ def _clouds(recording: Any, tables: Tables, points: ResidualPoints, shades: Shad
             away = rows["residual_m"].to_numpy()[:, None] * normals.get(name, np.zeros(3))
             cloud = rr.Points3D((calibrated - away).astype(np.float32), radii=DOT_M, colors=colours)
             recording.log(f"residuals/{sensor}/{name}", cloud, step, static=True)
-            if sensor == "mbes":
+            if sensor != "laser":
+                own = name if sensor == "mbes" else f"{sensor}/{name}"
                 coarse = rows[[f"coarse_{column}" for column in XYZ]].to_numpy()
                 for when, where in (("before", coarse), *([("after", calibrated)] if solved else [])):
                     cloud = rr.Points3D(where, radii=DOT_M, colors=colour)
-                    recording.log(f"{when}/{name}", cloud, step, static=True)
+                    recording.log(f"{when}/{own}", cloud, step, static=True)
 
 
 def _maps(recording: Any, cells: pd.DataFrame, faces: pd.DataFrame, span: dict[str, float]) -> None:
@@ -135,7 +139,7 @@ def _maps(recording: Any, cells: pd.DataFrame, faces: pd.DataFrame, span: dict[s
     cells = cells[np.isfinite(cells["mean_m"]) & (cells["count"] >= FEWEST)]
     normals = normals_of(faces)
     family = faces["family"].to_numpy()
-    for sensor in SENSORS:
+    for sensor in span:
         for name in family_names(faces):
             numbers = cells["face"].to_numpy().astype(int)
             rows = cells[(cells["sensor"] == sensor).to_numpy() & (family[numbers] == name)]
@@ -169,8 +173,9 @@ def _replay(recording: Any, tables: Tables, points: ResidualPoints, shades: Shad
 
     if not np.isfinite(tables.table(ESTIMATE)["value"].to_numpy()[:6]).all():
         return
+    of_sonar = (points.residuals["sensor"] != "laser").to_numpy()
     for name, colour in shades.items():
-        rows = points.residuals[(points.residuals["sensor"] == "mbes").to_numpy() & (points.family == name)]
+        rows = points.residuals[of_sonar & (points.family == name)]
         rows = rows.iloc[:: max(1, -(-len(rows) // MOST_IN_REPLAY))]
         coarse, calibrated = rows[[f"coarse_{column}" for column in XYZ]].to_numpy(), rows[XYZ].to_numpy()
         for part in range(PARTS + 1 if len(rows) else 0):
@@ -189,32 +194,36 @@ def _over_time(recording: Any, bins: pd.DataFrame, steps: dict[str, int], shades
         t_ns = np.round(np.asarray(seconds, dtype=np.float64) * NS).astype(np.int64)
         log_curve(recording, path, style, partial(time_column, t_ns), values)
 
-    for sensor in SENSORS:
+    for sensor in steps:
         rows = bins[bins["sensor"] == sensor]
         if not len(rows):
             continue
         count = rows.groupby("low", sort=True)["count"].sum()
         thinned = f", one in {steps[sensor]} of them" if steps[sensor] > 1 else ""
         shown = count.to_numpy(np.float64)
-        dots(f"quality/points/{sensor}", f"{sensor}{thinned}", count.index + 0.5, shown, SENSORS[sensor])
+        of_points = LASER if sensor == "laser" else SONAR
+        dots(f"quality/points/{sensor}", f"{sensor}{thinned}", count.index + 0.5, shown, of_points)
         for name, colour in shades.items():
             of_family = rows[(rows["family"] == name) & np.isfinite(rows["mean_m"])]
             if len(of_family):
                 where = of_family["low"].to_numpy() + 0.5
-                shade = colour if sensor == "mbes" else tuple((part + 2 * 160) // 3 for part in colour)
+                shade = colour if sensor != "laser" else tuple((part + 2 * 160) // 3 for part in colour)
                 mean = 1000 * of_family["mean_m"].to_numpy()
                 dots(f"quality/residual/{sensor}/{name}", f"{sensor}/{name}", where, mean, shade)
 
 
 def _log_text(recording: Any, tables: Tables, span: dict[str, float]) -> None:
-    matrix = tables.table(COVARIANCE)["correlation"].to_numpy().reshape(6, 6)
+    correlation = tables.table(COVARIANCE)["correlation"].to_numpy()
+    size = math.isqrt(len(correlation))
+    matrix = correlation.reshape(size, size)[:N_MOUNT, :N_MOUNT]
     places = [place for _, place, *_ in PARAMETERS]
     lines = ["Colours: blue, grey, orange from minus to plus; the strongest at"]
-    lines += [f"  {s}: {1000 * span[s]:.1f} mm (points), {1000 * span[s] / 3:.1f} mm (means)" for s in SENSORS]
+    lines += [f"  {s}: {1000 * span[s]:.1f} mm (points), {1000 * span[s] / 3:.1f} mm (means)" for s in span]
     lines += ["Plus: towards the boat, of horizontal faces up.", "", "Observations, and their variance factors:"]
     for row in tables.table(GROUPS).to_dict("records"):
         lines.append(f"  {row['group']:<16}{row['count']:>10,}{row['variance_factor']:>8.3f}")
     names = [name for name, *_ in PARAMETERS]
     rows = [(name, *(f"{matrix[place, column]:.2f}" for column in places)) for name, place, *_ in PARAMETERS]
-    lines += ["", "Correlations", *text_table("<6" + ">7" * len(names), ("", *names), rows)]
+    words = "Correlations" if size == N_MOUNT else "Correlations of the first head's parameters"
+    lines += ["", words, *text_table("<6" + ">7" * len(names), ("", *names), rows)]
     recording.log("tables/residuals", text_document("\n".join(lines)), static=True)

@@ -19,7 +19,9 @@ from pipeline.artefacts.catalogue.results import ESTIMATE
 from pipeline.artefacts.catalogue.target import TARGET_POSE
 from pipeline.artefacts.from_tables import trajectory_in_target
 from pipeline.gps_time import NS
+from pipeline.maths.adjustment.parameters import kind_of
 from pipeline.maths.geometry.rotations import exp_so3
+from pipeline.maths.mount_parameters import MOUNT_NAMES
 from pipeline.mount import Mounted, mount_of
 from pipeline.run.results import Tables
 from pipeline.run.settings import read_settings
@@ -51,7 +53,10 @@ def log_boats(recording: Any, tables: Tables, residuals: pd.DataFrame) -> None:
     session = settings.session
     trajectory = trajectory_in_target(tables.table(POSES), tables.table(TARGET_POSE))
     mounts = {"laser": mount_of(session.laser.mount)}
-    mounts[session.calibrated] = _calibrated(tables, mount_of((session.mbes or session.laser).mount))
+    if session.mbes is None:
+        mounts["laser"] = _calibrated(tables, mounts["laser"], "")
+    for name, block in session.heads.items():
+        mounts[name] = _calibrated(tables, mount_of(block.mount), "" if block is session.mbes else name)
     first = residuals["pass"].min()  # the boat of this pass has names at its sensors; more would hide the scene
     for number, of_pass in residuals.groupby("pass", sort=True):
         epochs = {}
@@ -65,8 +70,9 @@ def log_boats(recording: Any, tables: Tables, residuals: pd.DataFrame) -> None:
         _boat(recording, path, position, R_target_from_body, settings.pool.target.water_level_m)
         _axes(recording, f"{path}/axes", 0.8, "INS" if named else "")
         for sensor, mount in mounts.items():
-            place, name = f"{path}/{NAMES[sensor]}", NAMES[sensor]
-            _sensor(recording, place, mount, BOXES_M[sensor])
+            name = NAMES.get(sensor, sensor)
+            place = f"{path}/{name}"
+            _sensor(recording, place, mount, BOXES_M[kind_of(sensor)])
             _axes(recording, f"{place}/axes", 0.45, name if named else "")
 
 
@@ -83,7 +89,7 @@ def _fan(
     origins = positions + R_target_from_body @ mounts[sensor].lever_arm_body_m
     ends = fan[[f"{axis}_target_m" for axis in "xyz"]].to_numpy(np.float64)
     rays = np.stack([origins, ends], axis=1).astype(np.float32)
-    lines = rr.LineStrips3D(rays, radii=0.004, colors=SONAR if sensor == "mbes" else GREY)
+    lines = rr.LineStrips3D(rays, radii=0.004, colors=GREY if sensor == "laser" else SONAR)
     recording.log(f"fans/{sensor}/pass_{number}", lines, static=True)
 
 
@@ -118,9 +124,13 @@ def _axes(recording: Any, path: str, length_m: float, name: str) -> None:
         recording.log(f"{path}/name", point, static=True)
 
 
-def _calibrated(tables: Tables, coarse: Mounted) -> Mounted:
-    """Return the mount of the adjustment's estimate; the coarse mount if there is no estimate."""
-    values = tables.table(ESTIMATE)["value"].to_numpy()[:6]
+def _calibrated(tables: Tables, coarse: Mounted, head: str) -> Mounted:
+    """Return the mount of the adjustment's estimate; the coarse mount if there is no estimate.
+
+    ``head``: name of a further head; empty: the first one, or the laser.
+    """
+    estimate = tables.table(ESTIMATE).set_index("unknown")["value"]
+    values = estimate.loc[[f"{head}_{name}" if head else name for name in MOUNT_NAMES]].to_numpy()
     if not np.all(np.isfinite(values)):
         return coarse
     return Mounted(exp_so3(values[:3]) @ coarse.R_body_from_sensor, coarse.lever_arm_body_m + values[3:])

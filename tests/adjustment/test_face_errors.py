@@ -24,7 +24,7 @@ def solved_with_faces(streams: dict[str, Stream], model: ObservationModel) -> Fi
         _, weight = adjustment.weighting.weights(observations)
         sums[sensor] = observations.sums(weight, by_face=True)
     found = final_solution(calibration, adjustment, with_shared_noise(calibration, adjustment, sums))
-    if adjustment.ping is not None and adjustment.ping.excess == 0:  # else sums of faces are approximate
+    if all(ping.excess == 0 for ping in adjustment.pings.values()):  # else sums of faces are approximate
         u = adjustment.state.size
         scale = np.sqrt(np.maximum(np.diag(adjustment.equations.normal), 1e-300))
         alike = found.equations.normal[:u, :u] / scale / scale[:, None]

@@ -34,8 +34,10 @@ def variables(sensor, measured, along, noise_m, start_m, calibrated="mbes"):
         trajectory=SimpleNamespace(positions_m=positions, R_frame_from_body=TURNS),
         lever_arm=lambda sensor, state: LEVER_ARM,
     )
-    model = SimpleNamespace(body=body, wet_heights_m=(-4.0, WATER_M), points_in_target=lambda points, state: measured)
-    return dict(_variables(model, sensor, observed, SimpleNamespace(calibrated=calibrated)))
+    model = SimpleNamespace(
+        body=body, wet_heights_m=(-4.0, WATER_M), points_in_target=lambda sensor, points, state: measured
+    )
+    return dict(_variables(model, sensor, observed, SimpleNamespace(heads=(calibrated,))))
 
 
 @pytest.mark.parametrize("side", [-1, 1])  # of n · d: a face, or a bottom, whose family's normal is that of the tops

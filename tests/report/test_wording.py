@@ -18,6 +18,7 @@ from pipeline.report.as_built import deviations_from_design
 from pipeline.report.calibration_document import statement_lists
 from pipeline.report.cast_checks import cast_origin_warnings, cast_warnings
 from pipeline.report.drift_check import check_ins_drift, figures_disagree
+from pipeline.report.heads import outside_passes
 from pipeline.report.label_checks import unsettled_labels
 from pipeline.report.limit_checks import soundings_above_limit
 from pipeline.report.noise_warnings import correlated_beams, sigmas_too_small, uneven_noise
@@ -57,6 +58,7 @@ MODEL = target_of(parse(PoolConfig, {"target": DOCK["target"]}, "pool").target)
 
 IN_TURN = replace(ADJUSTED, method="patent_alternating")
 OF_LASER = replace(ADJUSTED, search=replace(SEARCH, sensor="laser", max_angle_deg=1.5, max_lever_arm_m=float("inf")))
+LABELLED = pd.DataFrame({"source": ["soundings_pool"], "reason": ["used"], "count": [1000]})
 SHAPE = {"b_m": 3.0, "e_m": 0.5, "corner_deg": {"P1": 45.0, "P3": 45.0}, "lean_deg": {"P1": 0.0, "P2": 0.0, "P3": 0.0}}
 FILES = pd.DataFrame({"sound_speed_low_m_s": [1504.1], "sound_speed_high_m_s": [1504.1]})
 PROJECTOR = {"unknown": "projector_z", "known": True, "value": 0.119, "sigma": 0.005, "expected": 0.06}
@@ -213,6 +215,11 @@ OTHERS: list[tuple[Callable[[], Iterable[Statement]], ReasonCode, str]] = [
         lambda: passes_with_one_sensor([{"pass": 6, "laser_points": 0, "soundings": 9}]),
         ReasonCode.PASS_WITHOUT_LASER,
         "pass 6: the sonar saw the target, and there are no laser points on it; was it recording?",
+    ),
+    (
+        lambda: outside_passes(pd.DataFrame({"sensor": ["mbes_2"], "count": [980]}), {"mbes_2": LABELLED}),
+        ReasonCode.SOUNDINGS_OUTSIDE_PASSES,
+        "mbes_2: 20 of its 1,000 soundings on the target lie outside the passes of the first head, and are not used",
     ),
     (
         lambda: deviations_from_design(SHAPE | {"b_m": 3.012}, SHAPE, {}),

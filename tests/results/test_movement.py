@@ -11,7 +11,8 @@ from pipeline.adjustment.error_sources import ERROR_SOURCES, OWNERS, source_of, 
 from pipeline.config.pool import AsBuilt
 from pipeline.config.session import Laser, Mbes
 from pipeline.config.target import Letters
-from pipeline.maths.adjustment.parameters import ObservedSurface, State
+from pipeline.maths.adjustment.observed_surface import ObservedSurface
+from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.mount_parameters import N_MOUNT
 from pipeline.results.movement import movement_between
 from pipeline.results.session_estimate import SessionEstimate, session_estimate

@@ -1,4 +1,4 @@
-"""Points of both sensors by a forward model of its own, their errors, and their adjustment."""
+"""Points of the laser and of one or two heads by a forward model of its own, their errors, and their adjustment."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -16,13 +16,16 @@ from pipeline.config.pool import Adjust
 from pipeline.config.session import Drift, Ins, Laser, Mbes, White
 from pipeline.maths.adjustment.body_motion import BodyMotion
 from pipeline.maths.adjustment.face_shifts import Faces
-from pipeline.maths.adjustment.parameters import ObservedSurface, State
+from pipeline.maths.adjustment.observed_surface import ObservedSurface
+from pipeline.maths.adjustment.parameters import FurtherHead, State
 from pipeline.maths.adjustment.solution import ConsiderErrors
 from pipeline.maths.geometry.trajectory import Trajectory
 from tests.support.mount_errors import rotation_error
 
 R_TRUE = Rotation.from_euler("ZXY", np.radians([-2.0, 1.2, -48.8])).as_matrix()
 LEVER_TRUE = np.array([0.3, 0.2, -2.0])
+R_SECOND = Rotation.from_euler("ZXY", np.radians([3.0, -0.7, -35.0])).as_matrix()  # of a second head
+LEVER_SECOND = np.array([-0.4, 0.1, -1.9])
 R_LASER = Rotation.from_euler("ZXY", np.radians([0.4, -0.2, 0.3])).as_matrix()
 LASER_LEVER = np.array([0.2, 0.5, 1.1])
 ROOT = np.sqrt(0.5)
@@ -75,8 +78,9 @@ def made(
     latency_s: float = 0.0,
     faster: float = 0.0,
     shifted: Mapping[int, float] = {},
+    heads: int = 1,
 ) -> tuple[dict[str, Stream], ObservationModel]:
-    """Points of both sensors; the sonar's clock late by ``latency_s``, the sound faster than recorded by a share.
+    """Points of all sensors; the sonar's clock late by ``latency_s``, the sound faster than recorded by a share.
 
     ``shifted``: distances (m) by which faces stand off their place, along the normal.
     """
@@ -118,32 +122,37 @@ def made(
     target = trajectory.points_from_body(t_ns, x @ R_LASER.T + LASER_LEVER)
     laser = columns(t_ns, face, x, "laser_m") | {f"{axis}_target_m": target[:, k] for k, axis in enumerate("xyz")}
 
-    moment = moments(30, 160)
-    face = np.repeat(rng.choice([0, 1, 2, 3], 160, p=[0.2, 0.5, 0.2, 0.1]), 30)
-    angle = rng.uniform(np.radians(-45), np.radians(40), len(moment))
-    rays = np.column_stack([np.sin(angle), 0 * angle, -np.cos(angle)])
-    strayed = angle + sensors * np.radians(0.06) * rng.normal(size=len(angle))
-    x = met(moment, face, np.column_stack([np.sin(strayed), 0 * angle, -np.cos(strayed)]), LEVER_TRUE, R_TRUE)
-    x = rays * np.linalg.norm(x, axis=1, keepdims=True)  # recorded at the angle that was meant
-    moment, face, x = (values[np.isfinite(x[:, 0])] for values in (moment, face, x))
-    x = x + sensors * 0.008 * x / np.linalg.norm(x, axis=1, keepdims=True) * rng.normal(size=(len(x), 1))
-    down = -x[:, 2]
-    x = x - faster * np.column_stack([2 * x[:, 0], 0 * down, -down + x[:, 0] ** 2 / down])
-    mbes = columns(((moment + latency_s) * NS).round().astype(np.int64), face, x, "mbes_m")
+    def soundings(lever: np.ndarray, R: np.ndarray) -> dict[str, np.ndarray]:
+        moment = moments(30, 160)
+        face = np.repeat(rng.choice([0, 1, 2, 3], 160, p=[0.2, 0.5, 0.2, 0.1]), 30)
+        angle = rng.uniform(np.radians(-45), np.radians(40), len(moment))
+        rays = np.column_stack([np.sin(angle), 0 * angle, -np.cos(angle)])
+        strayed = angle + sensors * np.radians(0.06) * rng.normal(size=len(angle))
+        x = met(moment, face, np.column_stack([np.sin(strayed), 0 * angle, -np.cos(strayed)]), lever, R)
+        x = rays * np.linalg.norm(x, axis=1, keepdims=True)  # recorded at the angle that was meant
+        moment, face, x = (values[np.isfinite(x[:, 0])] for values in (moment, face, x))
+        x = x + sensors * 0.008 * x / np.linalg.norm(x, axis=1, keepdims=True) * rng.normal(size=(len(x), 1))
+        down = -x[:, 2]
+        x = x - faster * np.column_stack([2 * x[:, 0], 0 * down, -down + x[:, 0] ** 2 / down])
+        return columns(((moment + latency_s) * NS).round().astype(np.int64), face, x, "mbes_m")
+
+    mounts = {"mbes": (LEVER_TRUE, R_TRUE), "mbes_2": (LEVER_SECOND, R_SECOND)}
+    sonars = {name: soundings(*mounts[name]) for name in list(mounts)[:heads]}
 
     numbers = {"P1": 0, "P2": 1, "P3": 2, "H": 3}
     surfaces = [ObservedSurface.at(FACES[k][0], np.array(FACES[k][1]), np.array(FACES[k][2]), 0.0) for k in range(3)]
     surfaces.append(ObservedSurface.at("H", np.array([0.0, 0.0, 1.0]), np.array([0.5, 0.0, 0.0]), 0.0))
     coarse = Rotation.from_rotvec(np.radians([2.5, -2.0, 2.2])).as_matrix()
+    further = [FurtherHead("mbes_2", coarse.T @ R_SECOND, LEVER_SECOND - [0.15, 0.1, -0.2])][: heads - 1]
     model = ObservationModel(
         BodyMotion.of(trajectory, LASER_LEVER),
         Faces(tuple(f"{k}" for k in range(len(FACES))), np.array([numbers[f] for f, *_ in FACES]), np.ones(len(FACES))),
         np.array([height for *_, height in FACES]),
-        State.at(coarse @ R_TRUE, LEVER_TRUE + np.array([0.2, -0.25, 0.22]), surfaces),
-        {"laser": sensor_sigmas(LASER), "mbes": sensor_sigmas(MBES)},
+        State.at(coarse @ R_TRUE, LEVER_TRUE + np.array([0.2, -0.25, 0.22]), surfaces, further=further),
+        {"laser": sensor_sigmas(LASER), **dict.fromkeys(sonars, sensor_sigmas(MBES))},
         (-4.0, 0.0),
     )
-    return {"laser": Stream((MemoryPart("l", laser),)), "mbes": Stream((MemoryPart("m", mbes),))}, model
+    return {name: Stream((MemoryPart(name, points),)) for name, points in {"laser": laser, **sonars}.items()}, model
 
 
 def columns(t_ns: np.ndarray, face: np.ndarray, x: np.ndarray, suffix: str) -> dict[str, np.ndarray]:
@@ -152,9 +161,12 @@ def columns(t_ns: np.ndarray, face: np.ndarray, x: np.ndarray, suffix: str) -> d
 
 
 def error_of(found: MountAdjustment) -> np.ndarray:
-    """ε of R_true = Exp(ε) R, and of the lever arm."""
-    rotation = rotation_error(R_TRUE, found.state.R_body_from_sensor)
-    return np.concatenate([rotation, LEVER_TRUE - found.state.lever_arm_m])
+    """ε of R_true = Exp(ε) R, and of the lever arm; of one head after the other."""
+    errors = []
+    for head, (R, lever) in zip(found.state.heads, ((R_TRUE, LEVER_TRUE), (R_SECOND, LEVER_SECOND)), strict=False):
+        R_found, lever_found = found.state.mount_of(head)
+        errors += [rotation_error(R, R_found), lever - lever_found]
+    return np.concatenate(errors)
 
 
 def solved(seed: int, ins: Ins = QUIET, settings: Any = None, **options: Any) -> MountAdjustment:

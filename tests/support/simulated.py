@@ -3,7 +3,7 @@
 import copy
 import functools
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -60,6 +60,15 @@ def _made(scenario: str, seed: int) -> SimulatedSession:
     return simulate_session(parse(Scenario, json.loads(scenario), "test"), seed)
 
 
+def made_with_heads(
+    *parts: Mapping[str, Any], mounts: Sequence[Mapping[str, float]], seed: int = 1
+) -> SimulatedSession:
+    """A thinned session of a sonar with a head for each of these mounts; not kept."""
+    scenario = merged({"name": "test"}, THIN, *parts)
+    scenario["mbes"] = [scenario["mbes"] | {"mount": dict(mount)} for mount in mounts]
+    return simulate_session(parse(Scenario, scenario, "test"), seed)
+
+
 def calibrated(
     session: SimulatedSession,
     until: str = "report",
@@ -73,12 +82,13 @@ def calibrated(
     """Every artefact; ``pool``, ``mount`` and ``laser`` change the pool's target, the coarse sonar mount, and by how
     much the laser's mount is wrong; the stages of the artefacts in ``known`` are not run again."""
     settings, design = copy.deepcopy(session.session), copy.deepcopy(session.pool)
-    settings["mbes"]["mount"].update(mount or {})
+    if mount:
+        settings["mbes"]["mount"].update(mount)
     for key, value in (laser or {}).items():
         settings["laser"]["mount"][key] += value
     for key, value in (pool or {}).items():
         design.setdefault(key, {}).update(value) if isinstance(value, dict) else design.update({key: value})
-    columns = {"ins": session.ins, "laser": session.laser, "mbes": session.mbes, **(raw or {})}
+    columns = {**session.raw, **(raw or {})}
     return calibrate_in_memory(
         parse(SessionConfig, settings, "session"), parse(PoolConfig, design, "pool"), columns, until, changed, known
     )
@@ -89,8 +99,10 @@ def without_biases(session: SimulatedSession) -> SimulatedSession:
     survey = dict.fromkeys(("face_sigma_m", "offset_sigma_m", "angle_sigma_deg", "bow_sigma_m"), 0.0)
     of_ranges = ("range_bias_sigma_m", "incidence_bias_sigma_m", "level_bias_sigma_m")
     of_sonar = (*of_ranges, "projector_sigma_m", "sound_speed_gradient_sigma_1_s")
+    heads = session.session["mbes"]
+    exact = [head | dict.fromkeys(of_sonar, 0.0) for head in (heads if isinstance(heads, list) else [heads])]
     known = {
-        "mbes": session.session["mbes"] | dict.fromkeys(of_sonar, 0.0),
+        "mbes": exact if isinstance(heads, list) else exact[0],
         "laser": session.session["laser"] | {"incidence_bias_sigma_m": 0.0},
     }
     return replace(

@@ -84,7 +84,7 @@ def install(put: Callable[[object, str, object], object]) -> dict[str, types.Mod
     put(pipeline.readers.dispatch, "raw_files", toys.raw_files)
     put(pipeline.readers.dispatch, "raw_parts", toys.raw_parts)
     repeat = importlib.import_module("stages.commands.repeat")  # not before the toys are in their places
-    put(importlib.import_module("stages.commands.run"), "say_next", lambda _: None)  # toys have no values to enter
+    put(importlib.import_module("stages.commands.run"), "say_next", lambda *_: None)  # toys have no values to enter
     put(repeat, "WORKER", [sys.executable, __file__, REPEAT_WORKER])
     return {module.__name__: module for module in (take, sift, report)}
 

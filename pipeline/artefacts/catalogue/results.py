@@ -98,6 +98,13 @@ FREED = Artefact(
         ),
     ),
 )
+HEAD_EFFECTS = Artefact(
+    "adjust", "head_effects", "table", "effects on the mounts of further heads, for each parameter of freed",
+    (
+        Column("head", TEXT, "", "mbes_2, ..."),
+        *(column for column in FREED.columns if column.name == "unknown" or column.name.startswith("effect_")),
+    ),
+)
 SETS = Artefact(
     "adjust", "sets", "table", "joint test of each set of parameters that may all be wrong at once",
     (

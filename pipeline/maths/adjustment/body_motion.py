@@ -103,4 +103,4 @@ class BodyMotion:
 
     def lever_arm(self, sensor: str, state: State) -> Array:
         """Return the sensor's lever arm (3,) m, body axes: the estimate if it is calibrated, else as configured."""
-        return state.lever_arm_m if sensor == state.calibrated else self.laser_lever_arm_m
+        return state.mount_of(sensor)[1] if sensor in state.heads else self.laser_lever_arm_m

@@ -77,7 +77,8 @@ from numpy.typing import NDArray
 
 from pipeline.maths.adjustment.body_motion import BodyPoses
 from pipeline.maths.adjustment.interval_sums import N_MOVED, Runs
-from pipeline.maths.adjustment.parameters import FEATURES, ObservedSurface, State
+from pipeline.maths.adjustment.observed_surface import ObservedSurface
+from pipeline.maths.adjustment.parameters import FEATURES, State, kind_of
 from pipeline.maths.adjustment.pose_errors import N_POSE
 from pipeline.maths.kernels.compiled import block
 from pipeline.maths.kernels.interval_designs import Form, Plane, design_intervals
@@ -275,7 +276,8 @@ def parameter_design(state: State, observed: SensorOnSurface, poses: BodyPoses) 
     """
     plane = state.surfaces[observed.surface]
     design = np.zeros((len(poses.rates), observed.features, len(state.columns(observed.sensor, observed.surface))))
-    wet, further = observed.sensor == "mbes", len(FEATURES[observed.sensor])
+    kind = kind_of(observed.sensor)
+    wet, further = kind == "mbes", len(FEATURES[kind])
     form = Form(further, level_range=wet and plane.level, wet=wet, bow=wet and not plane.level)
     seen = Plane(*map(block, (plane.normal, plane.tangents, plane.centre_m, observed.lever_arm_m)))
     positions_m, T, rates = map(block, (poses.positions_m, poses.R_target_from_body, poses.rates))

@@ -27,7 +27,8 @@ from numpy.typing import NDArray
 
 from pipeline.maths.adjustment.interval_sums import blocks
 from pipeline.maths.adjustment.normal_equations import Linearisation
-from pipeline.maths.adjustment.parameters import ObservedSurface, State
+from pipeline.maths.adjustment.observed_surface import ObservedSurface
+from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.geometry.rotations import exp_so3
 
 Array = NDArray[np.float64]

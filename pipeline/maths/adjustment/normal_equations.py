@@ -187,22 +187,23 @@ def updated_sums(linearisation: Linearisation, step: Array, drift_step: DriftEst
     return {sensor: sums.shifted(changes[sensor]) for sensor, sums in linearisation.sums.items()}
 
 
-def mount_step(linearisation: Linearisation) -> Array:
-    """Return the step (u,) of the mount that brings its sensor's points onto the current surfaces, poses being true.
+def mount_step(linearisation: Linearisation, sensor: str) -> Array:
+    """Return the step (u,) of a sensor's mount that brings its points onto the current surfaces, poses being true.
 
     It leads from a coarse mount to one near enough for the adjustment. The step is of first order, so that errors of
-    degrees need a few steps.
+    degrees need a few steps. The sums are those of this sensor alone.
     """
+    mount = linearisation.state.mount_columns(sensor)
     normal, right = np.zeros((N_MOUNT, N_MOUNT)), np.zeros(N_MOUNT)
     for source in linearisation.by_surface():
         for start in range(0, len(source.rows), BLOCK):
             intervals = source.linearised(slice(start, start + BLOCK))
-            design = intervals.design[:, :, np.flatnonzero(intervals.columns < N_MOUNT)]
+            design = intervals.design[:, :, np.isin(intervals.columns, mount)]
             normal += np.einsum("gfi,gfh,ghj->ij", design, intervals.sums.normal, design, optimize=True)
             right += np.einsum("gfi,gf->i", design, intervals.sums.right)
     scale = 1 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
     step = np.zeros(linearisation.state.size)
-    step[:N_MOUNT] = -scale * np.linalg.lstsq(normal * np.outer(scale, scale), scale * right, rcond=1e-9)[0]
+    step[mount] = -scale * np.linalg.lstsq(normal * np.outer(scale, scale), scale * right, rcond=1e-9)[0]
     return step
 
 

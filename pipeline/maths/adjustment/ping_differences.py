@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pipeline.maths.adjustment.design_matrix import pose_design
 from pipeline.maths.adjustment.interval_sums import N_MOVED, Intervals, IntervalSums, blocks
-from pipeline.maths.adjustment.parameters import ObservedSurface
+from pipeline.maths.adjustment.observed_surface import ObservedSurface
 from pipeline.maths.adjustment.weighting import FEWEST, EpochVarianceFactor
 
 Array = NDArray[np.float64]

@@ -41,7 +41,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.maths.adjustment.interval_sums import N_MOVED, Intervals, IntervalSums
-from pipeline.maths.adjustment.parameters import ObservedSurface
+from pipeline.maths.adjustment.observed_surface import ObservedSurface
 from pipeline.maths.adjustment.ping_differences import (
     CERTAIN,
     LEAST_SPREAD,

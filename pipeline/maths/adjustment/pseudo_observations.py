@@ -38,7 +38,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.maths.adjustment.parameters import N_SURFACE, ObservedSurface, State
+from pipeline.maths.adjustment.observed_surface import ObservedSurface
+from pipeline.maths.adjustment.parameters import N_SURFACE, State
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]

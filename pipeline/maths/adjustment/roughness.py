@@ -38,7 +38,7 @@ from numpy.typing import NDArray
 
 from pipeline.maths.adjustment.body_motion import BodyMotion
 from pipeline.maths.adjustment.interval_sums import N_MOVED, Intervals, blocks
-from pipeline.maths.adjustment.parameters import ObservedSurface
+from pipeline.maths.adjustment.observed_surface import ObservedSurface
 from pipeline.maths.adjustment.ping_differences import CERTAIN, Lines
 from pipeline.maths.adjustment.ping_noise import DesignEffects
 from pipeline.maths.adjustment.pose_errors import N_POSE, DriftEstimate

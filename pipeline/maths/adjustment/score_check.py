@@ -32,7 +32,6 @@ from pipeline.maths.adjustment.eliminate_white_noise import ReducedIntervals
 from pipeline.maths.adjustment.normal_equations import Linearisation, reduced_by_group
 from pipeline.maths.adjustment.pose_errors import DriftEstimate, Knots, PoseNoise
 from pipeline.maths.adjustment.pseudo_observations import PseudoObservations
-from pipeline.maths.mount_parameters import N_MOUNT
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -76,7 +75,7 @@ def score_check(
     b = rights.sum(axis=0) + prior.right[estimated]
     inverse = np.linalg.pinv(N, hermitian=True)
     scores = rights - normals @ (inverse @ b)
-    mount = np.flatnonzero(estimated < N_MOUNT)
+    mount = np.flatnonzero(np.isin(estimated, linearisation.state.mounts))
     influence = inverse[mount]  # (k, f)
     by_slot = np.einsum("kf,gfh->gkh", influence, normals)
     expected = np.einsum("gkh,kh->gk", by_slot, influence) - np.einsum("gkh,hi,gki->gk", by_slot, inverse, by_slot)

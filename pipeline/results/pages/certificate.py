@@ -68,16 +68,7 @@ def certificate_values(
         "identity": identity_rows(session.about),
         "about": session.about,
         "instruments": instruments_on_board(session),
-        "values": [
-            {
-                "name": row["name"],
-                "positive": POSITIVE[row["name"]],
-                "value": row["total"].entered(),
-                "within": Quantity(WITHIN_95 * row["sigma_total"].number, row["sigma_total"].unit).small(),
-                "held": row["held"],
-            }
-            for row in rows
-        ],
+        "values": value_rows(rows),
         "drawings": sign_drawings(mounted_of(block) if block["mount"] else coarse, sonar),
         "soundings": _soundings(covariance, settings.limits) if sonar and covariance else None,
         "done": _done(result, sonar),
@@ -86,6 +77,20 @@ def certificate_values(
         "assumed_recorded": is_recorded(settings),
         "digests": _digests(manifests, result, settings),
     }
+
+
+def value_rows(rows: Sequence[Row]) -> list[Row]:
+    """Return the certificate's row for each mount parameter, by its row in the report."""
+    return [
+        {
+            "name": row["name"],
+            "positive": POSITIVE[row["name"]],
+            "value": row["total"].entered(),
+            "within": Quantity(WITHIN_95 * row["sigma_total"].number, row["sigma_total"].unit).small(),
+            "held": row["held"],
+        }
+        for row in rows
+    ]
 
 
 def _kind(result: Row, rows: Sequence[Row]) -> str:
@@ -117,6 +122,10 @@ def instruments_on_board(session: SessionConfig) -> list[Row]:
         title = " ".join(filter(None, [about.make, about.model])) or (preset.title if preset else None)
         words = "; ".join(filter(None, [title, about.remarks])) or None
         rows.append({"sensor": sensor, "cells": (words, about.serial, about.firmware)})
+    for head, block in session.heads.items():
+        if block is not session.mbes:
+            title = None if block.instrument is None else block.instrument.title
+            rows.append({"sensor": f"sonar, {head}", "cells": (title, None, None)})
     return rows
 
 

@@ -3,8 +3,10 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from pipeline.config.heads import HEADS
 from pipeline.config.instruments import SENSORS, Sensor, figures
 from pipeline.config.pool import AsBuilt, LaserFit
+from pipeline.maths.adjustment.parameters import kind_of
 from pipeline.run.origins import origin_of, preset_of, value_of
 from pipeline.run.settings import Settings
 
@@ -28,7 +30,7 @@ def instrument_rows(settings: Settings, drift: Mapping[str, Any]) -> list[Row]:
         The block ``ins_drift`` of calibration.json: the drift's figures that were used.
     """
     rows: list[Row] = []
-    for sensor in SENSORS:
+    for sensor in (*SENSORS, *HEADS[1:]):
         if getattr(settings.session, sensor) is None:
             continue
         preset = preset_of(settings, sensor)
@@ -60,9 +62,10 @@ def _of_target(settings: Settings) -> list[str]:
     return as_built if settings.session.calibrated == "mbes" else ["as_built.face_sigma_m", *laser_fit]
 
 
-def _figures(settings: Settings, sensor: Sensor, drift: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
+def _figures(settings: Settings, sensor: str, drift: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
     """Yield key, value in words, and origin of each figure of a sensor."""
-    for key in [*figures(sensor), *_beside(settings, sensor)]:
+    kind: Sensor = "ins" if sensor == "ins" else kind_of(sensor)
+    for key in [*figures(kind), *_beside(settings, kind)]:
         if key.startswith("drift.") and key.removeprefix("drift.") in drift["from_files"]:
             yield key, _shown(drift[key.removeprefix("drift.")]), OF_FILES
         else:

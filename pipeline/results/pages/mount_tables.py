@@ -11,6 +11,7 @@ from pipeline.config.verdict import VerdictLimits
 from pipeline.limits.verdict_limits import limits_by_setting
 from pipeline.maths.adjustment.solution import CORRELATION_LIMIT
 from pipeline.maths.mount_parameters import PARAMETERS
+from pipeline.report.part_checks import part_and_head
 
 Row = Mapping[str, Any]
 STRONG = CORRELATION_LIMIT  # correlations of this size and above are in bold
@@ -81,7 +82,8 @@ def part_rows(parts: Sequence[Row]) -> list[Row]:
                     "strong": abs(change) > STRONG_SIGMAS * sigma,
                 }
             )
-        rows.append({"part": part["part"], "cells": cells, "test": part["test"]})
+        name, head = part_and_head(part["part"])
+        rows.append({"part": name, "head": head, "cells": cells, "test": part["test"]})
     return rows
 
 

@@ -10,7 +10,7 @@ from pipeline.artefacts.catalogue.results import CELLS, CLOSING, RESIDUALS
 from pipeline.artefacts.catalogue.target import FACES
 from pipeline.artefacts.from_tables import family_names
 from pipeline.report.as_built import family_title, reference_family
-from pipeline.results.pages.mount_tables import Quantity
+from pipeline.results.pages.mount_tables import METHODS, Quantity
 from pipeline.run.results import Tables, calibration
 
 Row = Mapping[str, Any]
@@ -21,7 +21,7 @@ def plane_agreement_rows(tables: Tables) -> list[dict[str, Any]]:
     """Return the plane agreement of sonar and laser: one row for each plane and mount.
 
     A family with faces at several distances has no single plane. Its row has NaN for the angle. The distance is the
-    mean distance of its points from the adjusted surface, sonar minus laser.
+    mean distance of its points from the adjusted surface, sonar minus laser; it is of the first head alone.
     """
     rows: list[Any] = tables.table(CLOSING).to_dict("records")
     faces = tables.table(FACES)
@@ -29,7 +29,7 @@ def plane_agreement_rows(tables: Tables) -> list[dict[str, Any]]:
     columns = ("sensor", "face", "residual_m", "coarse_residual_m")
     residuals, cells = tables.table(RESIDUALS, *columns), tables.table(CELLS)
     family = names[residuals["face"].to_numpy().astype(int)]
-    solved = calibration(tables.run)["methods"]["adjustment"]["mount"] is not None
+    solved = calibration(tables.run, several_heads=True)["methods"]["adjustment"]["mount"] is not None
     for name in family_names(faces):
         of_family = {sensor: residuals[(residuals["sensor"] == sensor) & (family == name)] for sensor in SENSORS}
         counts = cells[cells["family"] == name].groupby("sensor")["count"].sum()
@@ -50,6 +50,10 @@ def plane_agreement_rows(tables: Tables) -> list[dict[str, Any]]:
                     "laser_points": int(counts.get("laser", 0)),
                 }
             )
+    several = any("(" in str(row["mount"]) for row in rows)
+    for row in rows:
+        mount, _, head = str(row["mount"]).partition(" (")
+        row["words"] = METHODS[mount] + (f", {head.removesuffix(')') or 'mbes'}" if several else "")
     return sorted(rows, key=lambda row: str(row["plane"]))
 
 

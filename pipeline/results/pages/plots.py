@@ -78,7 +78,7 @@ def _family(residuals: pd.DataFrame, tables: Tables) -> NDArray[Any]:
 
 
 def _solved(tables: Tables) -> bool:
-    return calibration(tables.run)["methods"]["adjustment"]["mount"] is not None
+    return calibration(tables.run, several_heads=True)["methods"]["adjustment"]["mount"] is not None
 
 
 def picture_names(run: Path) -> list[str]:

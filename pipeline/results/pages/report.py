@@ -34,7 +34,7 @@ from pipeline.maths.target.family_words import families_in_words
 from pipeline.report.as_built import design_shape
 from pipeline.report.reason_codes import verdict_of
 from pipeline.report.sigma_sources import contributions, laser_correlates
-from pipeline.results.pages.certificate import certificate_values
+from pipeline.results.pages.certificate import certificate_values, value_rows
 from pipeline.results.pages.currency import page_digest
 from pipeline.results.pages.drift_words import drift_rows, drift_sentence
 from pipeline.results.pages.instrument_table import instrument_rows
@@ -96,7 +96,7 @@ def report_page(tables: Tables, manifests: Mapping[str, manifest.Manifest], pict
     pictures
         The pictures of :func:`~pipeline.results.pages.plots.picture_names`, in order.
     """
-    result, settings = calibration(tables.run), read_settings(tables.run)
+    result, settings = calibration(tables.run, several_heads=True), read_settings(tables.run)
     return render_page(
         "report.html",
         result=result,
@@ -122,7 +122,12 @@ def _result_values(
     rows = parameter_rows(calibrations, result["result"], settings.limits, held)
     correlates = laser_correlates(settings.session.calibrated, settings.session.laser.mount_covariance)
     sources = contributions(tables.table(FREED), result["methods"]["adjustment"], correlates)
+    heads = []
+    for head in result.get("heads", [])[1:]:
+        of_head = parameter_rows(calibrations, f"{result['result']} ({head['name']})", settings.limits, held)
+        heads.append({"name": head["name"], "parameters": of_head, "values": value_rows(of_head)})
     return {
+        "heads": heads,
         "certificate": certificate_values(tables, manifests, result, settings, rows),
         "limiting": list(limiting_sentences(sources, rows)),
         "held": [] if result["reasons"] else list(held),

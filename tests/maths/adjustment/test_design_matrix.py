@@ -9,11 +9,12 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.maths.adjustment.body_motion import BodyPoses
 from pipeline.maths.adjustment.design_matrix import SensorOnSurface, parameter_design, pose_design
+from pipeline.maths.adjustment.observed_surface import ObservedSurface
 from pipeline.maths.adjustment.parameters import (
     LASER_PARAMETERS,
     MBES_FEATURES,
     MBES_PARAMETERS,
-    ObservedSurface,
+    FurtherHead,
     State,
 )
 from pipeline.maths.adjustment.weighting import common_variance
@@ -35,38 +36,40 @@ FORM = np.linspace(0.2, 0.9, 7)  # of a bow, at the points
 def observed(sensor: str, state: State, surface: int, x: np.ndarray, pose: np.ndarray) -> Any:
     """v of points x (n, 3) in the sensor's frame, seen from a pose in error; nothing linear here but the pose error."""
     other = dict(zip(state.names, state.additional_values(), strict=True))
-    R, lever, prefix = state.R_body_from_sensor, state.lever_arm_m, ""
-    if sensor == "laser":
-        prefix = "laser_"
+    prefix, is_sonar = f"{sensor}_", sensor != "laser"
+    if is_sonar:
+        R, lever = state.mount_of(sensor)
+    else:
         turn = np.array([other[f"laser_rotation_{axis}"] for axis in "xyz"])
         R, lever = exp_so3(turn) @ R_LASER, LASER_LEVER + [other[f"laser_lever_arm_{axis}"] for axis in "xyz"]
-    latency = other[f"{prefix or 'mbes_'}latency"]
+    latency = other[f"{prefix}latency"]
     turned = exp_so3(-TURNING * latency) @ T
     range_m = np.linalg.norm(x, axis=1)
     incidence = np.arccos(np.abs(x @ R.T @ T.T @ SURFACES[surface].normal) / range_m)
-    bias = other[f"{prefix or 'mbes_'}range"]
-    bias = bias + other[f"{prefix or 'mbes_'}incidence"] * (1 / np.cos(incidence) - 1) / (np.sqrt(2) - 1)
-    if sensor == "mbes" and SURFACES[surface].family == "H":
-        bias = bias + other["mbes_level_range"]
+    bias = other[f"{prefix}range"]
+    bias = bias + other[f"{prefix}incidence"] * (1 / np.cos(incidence) - 1) / (np.sqrt(2) - 1)
+    if is_sonar and SURFACES[surface].family == "H":
+        bias = bias + other[f"{prefix}level_range"]
     longer = 1 + bias / range_m
     r = (x * longer[:, None] @ R.T + lever) @ turned.T
     X = P - VELOCITY * latency + pose[:3] + r + np.cross(pose[3:], r)
     one = state.surfaces[surface]
-    if sensor == "mbes":
+    if is_sonar:
         one = one.updated(*(other[f"wet_{one.family}_{name}"] for name in ("turn_1", "turn_2", "shift")))
         bow = 0.0 if one.family == "H" else other[f"wet_{one.family}_bow"]
         return (X - one.centre_m) @ one.normal - one.shift_m - bow * FORM
     return (X - one.centre_m) @ one.normal - one.shift_m
 
 
-@pytest.mark.parametrize("sensor", ["mbes", "laser"])
+@pytest.mark.parametrize("sensor", ["mbes", "mbes_2", "laser"])
 @pytest.mark.parametrize("surface", range(4))
 def test_columns_are_derivatives(sensor: str, surface: int) -> None:
     rng = np.random.default_rng(surface)
-    R = Rotation.random(random_state=surface).as_matrix()
-    state = State.at(R, np.array([0.3, 0.2, -2.0]), SURFACES)
+    R, other = Rotation.random(2, random_state=surface).as_matrix()
+    second = FurtherHead("mbes_2", other, np.array([-0.4, 0.1, -1.8]))
+    state = State.at(R, np.array([0.3, 0.2, -2.0]), SURFACES, further=[second])
     x, still = 3 * rng.normal(size=(7, 3)), np.zeros(6)
-    mount, lever = (R, state.lever_arm_m) if sensor == "mbes" else (R_LASER, LASER_LEVER)
+    mount, lever = (R_LASER, LASER_LEVER) if sensor == "laser" else state.mount_of(sensor)
     one = SURFACES[surface]
     x[:2] *= -np.sign(x[:2] @ mount.T @ T.T @ one.normal)[:, None] * [[1], [-1]]  # both sides: of H there are bottoms
     r = (x @ mount.T + lever) @ T.T
@@ -74,7 +77,7 @@ def test_columns_are_derivatives(sensor: str, surface: int) -> None:
     slant = ray @ one.normal
     by_incidence = slant * (1 / np.abs(slant) - 1) / (np.sqrt(2) - 1)
     q = np.vstack([np.ones(7), one.tangents @ r.T, slant, by_incidence])
-    if sensor == "mbes":  # the sonar's other features are tested where they are made
+    if sensor != "laser":  # the sonar's other features are tested where they are made
         q = np.vstack([q[:4], np.zeros((len(MBES_FEATURES) - 2, 7)), by_incidence, FORM])
     features = len(q)
     poses = BodyPoses(P[None], T[None], np.concatenate([VELOCITY, TURNING])[None])
@@ -125,3 +128,40 @@ def test_a_state_moves_each_unknown_by_its_name() -> None:
     np.testing.assert_allclose(moved.lever_arm_m, step[3:6])
     assert moved.surfaces[3].shift_m - SURFACES[3].shift_m == pytest.approx(step[state.names.index("H_shift")])
     assert replace(moved, additional=state.additional).additional_values().any() == np.False_
+
+
+def test_heads_share_the_water_and_the_wet_faces_and_nothing_else() -> None:
+    further = [FurtherHead(name, np.eye(3), np.zeros(3)) for name in ("mbes_2", "mbes_3")]
+    state = State.at(np.eye(3), np.zeros(3), SURFACES, further=further)
+    alone = State.at(np.eye(3), np.zeros(3), SURFACES)
+    assert state.names[: alone.size] == alone.names
+    of_head = [np.array(state.names)[state.columns(head, 2)].tolist() for head in state.heads]
+    assert of_head[0] == np.array(alone.names)[alone.columns("mbes", 2)].tolist()
+    for name, columns in zip(("mbes_2", "mbes_3"), of_head[1:], strict=True):
+        shared = set(columns) & set(of_head[0])
+        assert shared == {
+            *(f"P3_{part}" for part in ("turn_1", "turn_2", "shift")),
+            *(f"wet_P3_{part}" for part in ("turn_1", "turn_2", "shift", "bow")),
+            "sound_speed",
+            "sound_speed_gradient",
+        }
+        for first, own in zip(of_head[0], columns, strict=True):  # in the order of the design
+            assert own in (first, f"{name}_{first.removeprefix('mbes_')}")
+    assert not set(of_head[1]) & set(of_head[2]) - set(of_head[0])
+
+
+def test_each_head_takes_its_own_steps() -> None:
+    further = [FurtherHead("mbes_2", R_LASER, LASER_LEVER), FurtherHead("mbes_3", T, np.zeros(3))]
+    state = State.at(np.eye(3), np.zeros(3), SURFACES, further=further)
+    step = np.random.default_rng(3).normal(size=state.size) * 1e-3
+    moved = state.updated(step)
+    for head in state.heads:
+        (R, lever), (before, lever_before) = moved.mount_of(head), state.mount_of(head)
+        of_head = step[state.mount_columns(head)]
+        np.testing.assert_allclose(R, exp_so3(of_head[:3]) @ before, atol=1e-15)
+        np.testing.assert_allclose(lever - lever_before, of_head[3:], atol=1e-15)
+    kept = np.array([not (name[0] in "PH" and name.partition("_")[2] in ("turn_1", "turn_2")) for name in state.names])
+    centred = moved.deviation_from(state)
+    surfaces = np.array([0.01 * k for k in range(4)])
+    centred[state.surface_slice][2::3] -= surfaces  # a shift counts from the centre, not from the other state
+    np.testing.assert_allclose(centred[kept], step[kept], atol=1e-15)

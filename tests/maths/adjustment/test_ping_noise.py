@@ -8,7 +8,7 @@ import pytest
 
 from pipeline.maths.adjustment.design_matrix import pose_design
 from pipeline.maths.adjustment.interval_sums import IntervalSums, LinearisedPoints, interval_sums
-from pipeline.maths.adjustment.parameters import ObservedSurface
+from pipeline.maths.adjustment.observed_surface import ObservedSurface
 from pipeline.maths.adjustment.ping_noise import (
     DesignEffects,
     PingNoise,

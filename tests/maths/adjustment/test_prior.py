@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from pipeline.maths.adjustment.observed_surface import ObservedSurface
 from pipeline.maths.adjustment.parameter_tests import prior_parameter_tests
-from pipeline.maths.adjustment.parameters import ObservedSurface, State
+from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.pseudo_observations import ParameterPrior, all_pseudo_observations
 from pipeline.maths.adjustment.solution import ConsiderErrors, Solution, solve
 from pipeline.maths.geometry.rotations import exp_so3

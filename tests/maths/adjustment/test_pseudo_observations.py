@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pipeline.maths.adjustment.parameters import ObservedSurface, State
+from pipeline.maths.adjustment.observed_surface import ObservedSurface
+from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.pseudo_observations import DesignPrior, ParallelPrior, displacement
 
 RANDOM = np.random.default_rng(5)
