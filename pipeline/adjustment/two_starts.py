@@ -28,7 +28,6 @@ from pipeline.maths.adjustment.ping_noise import with_design_effects
 from pipeline.maths.adjustment.roughness import Roughness
 from pipeline.maths.adjustment.solution import solve
 from pipeline.maths.adjustment.weighting import Weighting
-from pipeline.maths.comparison import mount_error
 from pipeline.maths.mount_parameters import N_MOUNT
 
 Array = NDArray[np.float64]
@@ -82,8 +81,7 @@ def chosen_iteration(
 
 def _apart(one: WeightedIteration, other: WeightedIteration) -> Array:
     """Return the second's mount less the first's, (6,) rad and m."""
-    a, b = one.last.linearisation.state, other.last.linearisation.state
-    return mount_error(b.R_body_from_sensor, b.lever_arm_m, a.R_body_from_sensor, a.lever_arm_m)
+    return other.last.linearisation.state.deviation_from(one.last.linearisation.state)[:N_MOUNT]
 
 
 def _minimum(

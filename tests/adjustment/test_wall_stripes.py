@@ -96,7 +96,7 @@ def test_the_robust_line_is_that_of_most_heights() -> None:
 
 
 WALL = SimpleNamespace(normal=np.array([-1.0, 0.0, 0.0]), distance_m=0.0)  # at x = 0, seen from x < 0
-STATE = cast(Any, SimpleNamespace(calibrated="mbes", surfaces=[WALL] * 3))
+STATE = cast(Any, SimpleNamespace(heads=("mbes",), surfaces=[WALL] * 3))
 
 
 class Model:
@@ -109,7 +109,7 @@ class Model:
         lever_arm=lambda sensor, state: np.zeros(3),
     )
 
-    def points_in_target(self, batch: dict[str, np.ndarray], state: Any) -> np.ndarray:
+    def points_in_target(self, sensor: str, batch: dict[str, np.ndarray], state: Any) -> np.ndarray:
         return np.column_stack([batch["x"], 0 * batch["x"], batch["z"]])
 
 

@@ -1,6 +1,5 @@
 """A config that says ``target: {kind: found}``: found once, remembered, and refused in one line where it cannot be."""
 
-import inspect
 import json
 from pathlib import Path
 from typing import Any
@@ -8,10 +7,9 @@ from typing import Any
 import pytest
 import yaml
 
-from pipeline.config.found import Found
+from pipeline.config.found import DEPTH_M, Found
 from pipeline.run.folder import FOUND
 from pipeline.run.settings import RUN_YAML
-from stages.cli import preparing
 from tests.support.docks import DOCK
 from tests.support.places import Told, poolcal, simulate
 from tests.support.refusals import one_line
@@ -94,7 +92,8 @@ def test_what_says_nothing_true_is_refused(dock: Path, tmp_path: Path) -> None:
 
 
 def test_a_command_and_a_config_have_the_same_depth() -> None:
-    assert inspect.signature(preparing._target).parameters["depth"].default == Found(kind="found").depth_m
+    assert Found(kind="found").depth_m == DEPTH_M
+    assert f"default: {DEPTH_M:g}" in poolcal("target", "--help").out
 
 
 def test_before_anything_is_sailed_there_is_nothing_to_find(dock: Path, tmp_path: Path) -> None:

@@ -18,8 +18,9 @@ all passes, and errors of the pass (noise, drift), which are not. So for two pas
 The mean over blocks and pairs of passes is the estimate of V. Each pass is first freed of a line in y, which drift may
 give it and surfaces' parameters take up; of n blocks this takes 2 degrees of freedom, so V counts n / (n - 2) times.
 Without roughness the estimate has the variance (E M²)² / (n pairs) if blocks of a pass are independent; where drift
-makes them alike, the scatter of the estimates by pairs of passes shows more. The larger one holds. In a single pass,
-or of few pairs, roughness cannot be told from the pass's errors: all of E M² beyond noise counts as roughness.
+makes them alike, the scatter of the estimates by pairs of passes shows more. The larger one holds. Few pairs cannot be
+tested, because V is never above E M²: there roughness is what makes more than half of it. In a single pass it cannot be
+told from the pass's errors: all of E M² beyond noise counts as roughness.
 
 A short wall has few long blocks. So its short blocks say how rough it is, and all walls of the place together say by
 how much s V(s) grows from there, the most of all sizes. Where the long blocks of one wall say more, they hold. A wall
@@ -46,7 +47,8 @@ from pipeline.maths.adjustment.pose_errors import N_POSE, DriftEstimate
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 SIZES_M = (0.25, 0.5, 1.0, 2.0)  # lengths of blocks
-FEWEST_PAIRS = CERTAIN**2  # of fewer no V could be certain, for V is never above E M²
+FEWEST_PAIRS = CERTAIN**2  # of block means, for a test
+HALF_ALIKE = 0.5  # part of E M² that must be alike in both passes where a test is not possible
 FEWEST_BLOCKS, DETREND = 4, 2  # blocks in a pass; parameters of the line that it is freed of
 LEAST_SHARE = 0.1  # of the usual weight of a block: one with less is not used
 
@@ -156,9 +158,11 @@ def _of_block_means(mean: Array, weight: Array, used: NDArray[np.bool_]) -> tupl
         return 0.0, 0.0
     squares, of_block = np.sum(mean**2, axis=0), weight.sum(axis=0)
     mean_square, pairs = squares.sum() / count.sum(), np.sum(count * (count - 1)) / 2
-    if pairs > FEWEST_PAIRS:
+    if pairs > 0:
         V, sigma = np.sum(mean.sum(axis=0) ** 2 - squares) / 2 / pairs, mean_square / np.sqrt(pairs)
         sigma = max(sigma, _sigma_by_pairs(mean, used))
+        if pairs <= FEWEST_PAIRS:  # of so few no V is certain, for it is never above E M²
+            sigma = HALF_ALIKE * mean_square / CERTAIN
     else:
         noise = np.mean(1 / of_block[count > 0])
         V, sigma = mean_square - noise, noise * np.sqrt(2 / n)

@@ -75,3 +75,20 @@ def test_few_blocks_say_nothing() -> None:
     near = found.place_m < 0.6
     short = _PlacedLines(found.value[near], found.weight[near], found.place_m[near], found.run[near])
     assert short.by_size()[:, 0].max() == 0.0
+
+
+@pytest.mark.parametrize(("drift_m", "length_m", "least"), [(0.0, 0.2, 0.9), (0.003, 0.0, 0.0)])
+def test_two_passes_of_a_short_wall_are_rough_where_they_are_alike(
+    drift_m: float, length_m: float, least: float
+) -> None:
+    """1.2 m of wall, four blocks of 25 cm or more in two passes: too few pairs for a test."""
+    found = []
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        wall = field(rng, length_m, 0.01) if length_m else np.zeros_like
+        whole = lines(rng, wall, passes=2, drift_m=drift_m)
+        near = whole.place_m < 1.2
+        short = _PlacedLines(whole.value[near], whole.weight[near], whole.place_m[near], whole.run[near])
+        found.append(short.by_size()[:, 0].max() > 0)
+    assert np.mean(found) >= least
+    assert least or np.mean(found) < 0.4
