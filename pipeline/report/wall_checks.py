@@ -10,7 +10,7 @@ from pipeline.maths.adjustment.parameters import kind_of
 from pipeline.report.calibration_document import json_number
 from pipeline.report.cause_words import size_words
 from pipeline.report.noise_warnings import points_of
-from pipeline.report.reason_codes import ReasonCode, Statement
+from pipeline.report.reason_codes import ReasonCode, Statement, named
 
 LEAST_PATCH_M = 0.001  # RMS of a wall's patches that is worth a word
 SEEN_BY = {"laser": "above the water", "mbes": "below the water"}
@@ -117,4 +117,5 @@ def rough_walls(groups: pd.DataFrame) -> Iterator[Statement]:
                 f"{where}, patches of the walls stand off their planes ({walls}): fouled, or of rough stone; the "
                 "sigmas allow for it, and a cleaner wall gives smaller ones"
             )
-            yield Statement(ReasonCode.ROUGH_WALL, words)
+            head = "" if sensor in SEEN_BY else str(sensor)
+            yield from named(head, [Statement(ReasonCode.ROUGH_WALL, words)])

@@ -65,3 +65,9 @@ def test_a_wall_is_rough_from_a_millimetre_on(patch_m: float, said: bool) -> Non
     assert [one.code for one in found] == [ReasonCode.ROUGH_WALL] * said
     if said:
         assert found[0].words.startswith("below the water, patches of the walls stand off their planes (P2 by 1 mm)")
+
+
+def test_a_further_head_names_itself() -> None:
+    row = dict.fromkeys(column.name for column in GROUPS.columns) | {"sensor": "mbes_2", "family": "P2"}
+    (found,) = rough_walls(pd.DataFrame([row | {"patch_m": 0.004}]))
+    assert found.words.startswith("mbes_2: below the water, patches of the walls")
