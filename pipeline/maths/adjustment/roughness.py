@@ -19,7 +19,7 @@ The mean over blocks and pairs of passes is the estimate of V. Each pass is firs
 give it and surfaces' parameters take up; of n blocks this takes 2 degrees of freedom, so V counts n / (n - 2) times.
 Without roughness the estimate has the variance (E M²)² / (n pairs) if blocks of a pass are independent; where drift
 makes them alike, the scatter of the estimates by pairs of passes shows more. The larger one holds. Few pairs cannot be
-tested, because V is never above E M²: there roughness is what makes more than half of it. In a single pass it cannot be
+tested, because V is never above E M²: there roughness is what makes four fifths of it. In a single pass it cannot be
 told from the pass's errors: all of E M² beyond noise counts as roughness.
 
 A short wall has few long blocks. So its short blocks say how rough it is, and all walls of the place together say by
@@ -48,7 +48,7 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 SIZES_M = (0.25, 0.5, 1.0, 2.0)  # lengths of blocks
 FEWEST_PAIRS = CERTAIN**2  # of block means, for a test
-HALF_ALIKE = 0.5  # part of E M² that must be alike in both passes where a test is not possible
+MOSTLY_ALIKE = 0.8  # part of E M² that must be alike in both passes where a test is not possible
 FEWEST_BLOCKS, DETREND = 4, 2  # blocks in a pass; parameters of the line that it is freed of
 LEAST_SHARE = 0.1  # of the usual weight of a block: one with less is not used
 
@@ -162,7 +162,7 @@ def _of_block_means(mean: Array, weight: Array, used: NDArray[np.bool_]) -> tupl
         V, sigma = np.sum(mean.sum(axis=0) ** 2 - squares) / 2 / pairs, mean_square / np.sqrt(pairs)
         sigma = max(sigma, _sigma_by_pairs(mean, used))
         if pairs <= FEWEST_PAIRS:  # of so few no V is certain, for it is never above E M²
-            sigma = HALF_ALIKE * mean_square / CERTAIN
+            sigma = MOSTLY_ALIKE * mean_square / CERTAIN
     else:
         noise = np.mean(1 / of_block[count > 0])
         V, sigma = mean_square - noise, noise * np.sqrt(2 / n)
