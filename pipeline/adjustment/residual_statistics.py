@@ -25,7 +25,14 @@ from pipeline.maths.adjustment.interval_sums import Intervals, IntervalSums
 from pipeline.maths.adjustment.mean_tests import normal_deviates
 from pipeline.maths.adjustment.parameters import State, kind_of
 from pipeline.maths.adjustment.pose_errors import drift_between_passes
-from pipeline.maths.adjustment.profiles import FEWEST_BINS, PATCHES, off_line, profile_of, roughness_allowance
+from pipeline.maths.adjustment.profiles import (
+    FEWEST_BINS,
+    PATCHES,
+    off_line,
+    profile_of,
+    profiles_of,
+    roughness_allowance,
+)
 from pipeline.maths.adjustment.residual_means import (
     BinMean,
     BinnedResiduals,
@@ -152,10 +159,7 @@ def _allowances(
         return np.zeros(len(adjustment.state.surfaces)), np.zeros(len(faces.names))
     of_surface = PATCHES * rough.patch_m
     of_face = of_surface[faces.surface]
-    by_face: dict[int, list[BinMean]] = {}
-    for mean in bin_means(merged_residual_sums(heights)):
-        by_face.setdefault(mean.key[0], []).append(mean)
-    for face, means in by_face.items():
+    for face, means in profiles_of(heights).items():
         if len(means) >= FEWEST_BINS:
             number, value, _ = profile_of(means)
             of_face[face] = roughness_allowance(float(rough.patch_m[faces.surface[face]]), off_line(number, value))

@@ -5,7 +5,9 @@ other side (:mod:`~pipeline.maths.adjustment.mirrored_mount`). The first start, 
 takes wet walls that stand off by centimetres for errors of yaw and lever arm y, and may come to lie on the wrong side:
 two sessions of 24 at a pier of sheet piling so had a yaw that was wrong by 3.5°, ten of its sigmas. So the iteration
 starts from the other side as well. Mostly both end in one minimum; then the result is the first's. Otherwise it is that
-with the smaller sum of squares, both by the same weights, since each iteration scales its own residuals to one.
+with the smaller sum of squares, both by the same variances, since each iteration scales its own residuals to one. (The
+squares of soundings that robust weights cut are not in the sums.) With several heads, each of which could be on either
+side, the result is in doubt.
 """
 
 from collections.abc import Mapping
@@ -58,12 +60,13 @@ def chosen_iteration(
 ) -> ChosenIteration:
     """Return the iteration with the smaller sum of squares; parameters as for :func:`weighted_iteration`."""
     first = weighted_iteration(problem, streams, settings, gap_s)
-    one_head = len(problem.model.coarse.heads) == 1 and "mbes" in streams  # two heads see the walls from two sides
-    may_differ = problem.prior.from_start and one_head and not first.deficient
+    may_differ = problem.prior.from_start and "mbes" in streams and not first.deficient
     mirrored = None if not may_differ else mirrored_mount(first.last.linearisation)
     if mirrored is None:
         return ChosenIteration(first)
     coarse = problem.model.coarse
+    if len(coarse.heads) > 1:  # each could be on either side: that is not tried, but doubted
+        return ChosenIteration(first, Rival(mirrored.deviation_from(first.last.linearisation.state)[:N_MOUNT], 0.0))
     start = replace(coarse, R_body_from_sensor=mirrored.R_body_from_sensor, lever_arm_m=mirrored.lever_arm_m)
     second = weighted_iteration(problem, streams, settings, gap_s, start)
     if second.deficient or not second.settled:

@@ -22,18 +22,22 @@ from pipeline.adjustment.residual_places import heights_on_surface
 from pipeline.artefacts.streams import Batch, Stream, point_array
 from pipeline.gps_time import NS
 from pipeline.maths.adjustment.parameters import State, kind_of
-from pipeline.maths.adjustment.profiles import FEWEST_BINS, off_line, profile_of, roughness_allowance
+from pipeline.maths.adjustment.profiles import (
+    FEWEST_BINS,
+    Profiles,
+    off_line,
+    profile_of,
+    profiles_of,
+    roughness_allowance,
+)
 from pipeline.maths.adjustment.residual_means import (
     BinMean,
     BinnedResiduals,
     ResidualSums,
-    bin_means,
-    merged_residual_sums,
     residual_sums,
 )
 
 Array = NDArray[np.float64]
-Profiles = Mapping[int, Sequence[BinMean]]  # of the residuals by height, by number of the face
 BIN_M = 0.1  # height of a bin
 AT_END = 6  # heights at either end of a face that may be off together
 CERTAIN = 5.0  # sigmas by which a height must be off the line
@@ -72,15 +76,15 @@ class Stripe:
 
 @dataclass(frozen=True)
 class OutsideStripes:
-    """Tells which of a sensor's points do not lie in stripes; soundings are placed by the mount of a state."""
+    """Leaves those of a sensor's points that do not lie in stripes; soundings are placed by the mount of a state."""
 
     model: ObservationModel
     state: State
     sensor: str
     stripes: tuple[Stripe, ...]
 
-    def __call__(self, batch: Batch) -> NDArray[np.bool_]:
-        """Return which rows (n,) are kept."""
+    def __call__(self, batch: Batch) -> Batch:
+        """Return the rows that are left."""
         kept = np.ones(len(batch["face"]), dtype=bool)
         stripes = [stripe for stripe in self.stripes if stripe.sensor == self.sensor]
         kept &= ~np.isin(batch["face"], [stripe.face for stripe in stripes if stripe.whole])
@@ -89,7 +93,7 @@ class OutsideStripes:
         height = self._heights_m(some)
         for stripe in stripes if len(rows) else ():
             kept[rows[(some["face"] == stripe.face) & (height > stripe.low_m) & (height < stripe.high_m)]] = False
-        return kept
+        return {name: column[kept] for name, column in batch.items()}
 
     def _heights_m(self, points: Batch) -> Array:
         """Return the heights (n,) above the water at which the points' rays meet their surfaces, as in profiles."""
@@ -120,11 +124,7 @@ def profiles_by_height(
     sensor, stream : str, Stream
         The sensor, and its labelled points.
     """
-    profiles: dict[int, list[BinMean]] = {}
-    pieces = stream.fold(_sums_by_height, problem.model, sensor, adjustment.values)
-    for mean in bin_means(merged_residual_sums(pieces)):
-        profiles.setdefault(mean.key[0], []).append(mean)
-    return profiles
+    return profiles_of(stream.fold(_sums_by_height, problem.model, sensor, adjustment.values))
 
 
 def stripes_off(

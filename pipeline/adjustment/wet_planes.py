@@ -25,13 +25,14 @@ from pipeline.adjustment.face_errors import FinalSolution
 from pipeline.adjustment.iteration import MountAdjustment, adjust_mount
 from pipeline.adjustment.parameter_strengths import parameter_tests
 from pipeline.adjustment.problem import CalibrationProblem
-from pipeline.adjustment.wall_stripes import OutsideStripes, Profiles, Stripe, profiles_by_height, stripes_off
+from pipeline.adjustment.wall_stripes import OutsideStripes, Stripe, profiles_by_height, stripes_off
 from pipeline.artefacts.catalogue.results import LEFT_OUT
 from pipeline.artefacts.streams import Stream
 from pipeline.config.pool import Adjust
 from pipeline.maths.adjustment.mean_tests import joint_limit
 from pipeline.maths.adjustment.parameters import WET_PARAMETERS, kind_of
 from pipeline.maths.adjustment.plane_tests import PlaneTest, plane_test
+from pipeline.maths.adjustment.profiles import Profiles
 from pipeline.maths.adjustment.residual_means import BinMean
 
 FEWEST_SOUNDINGS = 30  # on a family of faces: with fewer its labels are not reliable
@@ -111,7 +112,7 @@ def adjust_true_faces(
         stripes += off or list(_whole_faces(problem, more))
         state, cuts = adjustment.state, tuple(stripes)
         points = {
-            sensor: stream.filtered(OutsideStripes(problem.model, state, sensor, cuts))
+            sensor: stream.changed(OutsideStripes(problem.model, state, sensor, cuts))
             for sensor, stream in streams.items()
         }
     columns = [column.name for column in LEFT_OUT.columns]

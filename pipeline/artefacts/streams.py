@@ -133,31 +133,31 @@ class ParquetPart:
 
 
 @dataclass(frozen=True)
-class FilteredPart:
-    """A part with those rows alone that a picklable function of a batch keeps."""
+class ChangedPart:
+    """A part whose batches a picklable function changes: it may leave out rows, and change columns."""
 
     part: Part
-    keep: Callable[[Batch], np.ndarray]
+    change: Callable[[Batch], Batch]
 
     @property
     def name(self) -> str:
         """Name of the part."""
         return self.part.name
 
-    def only(self, columns: tuple[str, ...]) -> "FilteredPart":
+    def only(self, columns: tuple[str, ...]) -> "ChangedPart":
         """Return the part with these columns alone, which must contain those that the function needs."""
         return replace(self, part=only(self.part, columns))
 
-    def pieces(self) -> list["FilteredPart"]:
+    def pieces(self) -> list["ChangedPart"]:
         """Return the part in pieces of consecutive rows."""
         return [replace(self, part=piece) for piece in pieces(self.part)]
 
     def chunks(self) -> Iterator[Chunk]:
         """Yield the rows that are left; no chunk is empty."""
         for chunk in self.part.chunks():
-            kept = self.keep(chunk.columns)
-            if kept.any():
-                yield Chunk({name: values[kept] for name, values in chunk.columns.items()})
+            columns = self.change(chunk.columns)
+            if len(next(iter(columns.values()))):
+                yield replace(chunk, columns=columns)
 
 
 @dataclass(frozen=True)
@@ -199,9 +199,9 @@ class Stream:
         """Return the stream with these columns alone, where it is read from files."""
         return replace(self, parts=tuple(only(part, tuple(columns)) for part in self.parts))
 
-    def filtered(self, keep: Callable[[Batch], np.ndarray]) -> "Stream":
-        """Return the stream with those rows alone that a picklable function of a batch keeps."""
-        return replace(self, parts=tuple(FilteredPart(part, keep) for part in self.parts))
+    def changed(self, change: Callable[[Batch], Batch]) -> "Stream":
+        """Return the stream whose batches a picklable function changes (:class:`ChangedPart`)."""
+        return replace(self, parts=tuple(ChangedPart(part, change) for part in self.parts))
 
     def batches(self) -> Iterator[Batch]:
         """Yield all rows in order, batch by batch, with one batch in memory."""

@@ -1,13 +1,19 @@
 """The start from the other side of the walls' normal: where it lies, and that it changes no result with one minimum."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from pipeline.adjustment import two_starts
 from pipeline.adjustment.accumulation import accumulate
 from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
+from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.adjustment.two_starts import chosen_iteration
-from pipeline.adjustment.weighted_iteration import weighted_iteration
+from pipeline.adjustment.weighted_iteration import WeightedIteration, weighted_iteration
 from pipeline.artefacts.streams import Stream
 from pipeline.config.pool import Adjust
 from pipeline.maths.adjustment.mirrored_mount import mirrored_mount
@@ -56,11 +62,43 @@ def test_walls_of_several_directions_have_no_other_side() -> None:
     assert mirrored_mount(linearised(*made(3))) is None
 
 
-def test_one_minimum_leaves_the_first_result_as_it_is() -> None:
+def unsurveyed(model: ObservationModel) -> CalibrationProblem:
+    """The problem of a wall that nobody has surveyed."""
+    surveyed = problem(model, NOISY)
+    return replace(surveyed, prior=replace(surveyed.prior, from_start=True))
+
+
+def test_one_minimum_leaves_the_first_result_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
     streams, model = made_of_wall(3, NOISY)
-    first = weighted_iteration(problem(model, NOISY), streams, Adjust(), 5.0)
-    chosen = chosen_iteration(problem(model, NOISY), streams, Adjust(), 5.0)
+    first = weighted_iteration(unsurveyed(model), streams, Adjust(), 5.0)
+    starts = []
+
+    def counted(*arguments: Any) -> WeightedIteration:
+        starts.append(arguments[4:])
+        return weighted_iteration(*arguments)
+
+    monkeypatch.setattr(two_starts, "weighted_iteration", counted)
+    chosen = chosen_iteration(unsurveyed(model), streams, Adjust(), 5.0)
+    assert len(starts) == 2
     assert chosen.rival is None
+    assert chosen_iteration(problem(model, NOISY), streams, Adjust(), 5.0).rival is None
+    assert len(starts) == 3  # a surveyed wall has no second start
     found, same = (one.last.linearisation.state for one in (chosen.weighted, first))
     assert np.array_equal(found.R_body_from_sensor, same.R_body_from_sensor)
     assert np.array_equal(found.lever_arm_m, same.lever_arm_m)
+
+
+def test_several_heads_at_one_wall_are_in_doubt(monkeypatch: pytest.MonkeyPatch) -> None:
+    streams, model = made_of_wall(3, NOISY)
+    first = weighted_iteration(unsurveyed(model), streams, Adjust(), 5.0)
+    monkeypatch.setattr(two_starts, "weighted_iteration", lambda *_: first)
+    two_heads = SimpleNamespace(
+        prior=SimpleNamespace(from_start=True), model=SimpleNamespace(coarse=SimpleNamespace(heads=("mbes", "mbes_2")))
+    )
+    chosen = chosen_iteration(cast(Any, two_heads), streams, Adjust(), 5.0)
+    assert chosen.weighted is first
+    assert chosen.rival is not None
+    assert chosen.rival.strength == 0.0
+    mount = first.last.linearisation.state.R_body_from_sensor
+    off_deg = Rotation.from_matrix(mount @ R_TRUE.T).as_rotvec(degrees=True)[2]  # the true yaw is -2°
+    assert np.degrees(chosen.rival.apart[2]) == pytest.approx(-2 * (-2.0 + off_deg), abs=0.6)  # twice the mean heading

@@ -5,17 +5,26 @@ median of the slopes of all pairs, its place the median of what remains. Up to 2
 moving it far. The scatter is the median absolute deviation times 1.4826, the standard deviation of normal errors.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.maths.adjustment.residual_means import BinMean
+from pipeline.maths.adjustment.residual_means import BinMean, ResidualSums, bin_means, merged_residual_sums
 
 Array = NDArray[np.float64]
+Profiles = Mapping[int, Sequence[BinMean]]  # by number of the face
 FEWEST_BINS = 8  # heights of a face whose profile is judged
 PATCHES = 3.0  # of the RMS of a rough wall's patches, or of its heights: a mean residual may be so much larger
 NORMAL = 1.4826
+
+
+def profiles_of(pieces: Iterable[ResidualSums]) -> Profiles:
+    """Return by face the mean residuals by height, from the lowest on, from sums by face and height."""
+    profiles: dict[int, list[BinMean]] = {}
+    for mean in bin_means(merged_residual_sums(pieces)):
+        profiles.setdefault(mean.key[0], []).append(mean)
+    return profiles
 
 
 def off_line(place: Array, value: Array) -> Array:
