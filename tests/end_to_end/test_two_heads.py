@@ -16,7 +16,7 @@ from tests.support.places import digests, poolcal, poolcal_process, result_of
 
 FIRST = {"roll_deg": -48.8, "pitch_deg": 1.2, "yaw_deg": -2.0, "x_m": 0.30, "y_m": 0.20, "z_m": -2.01}
 SECOND = {"roll_deg": -38.0, "pitch_deg": -0.9, "yaw_deg": 1.6, "x_m": -0.30, "y_m": -0.25, "z_m": -2.05}
-SCENARIO = {
+SCENARIO: dict[str, Any] = {
     "name": "two",
     "laser": {"point_rate_hz": 4000.0, "line_rate_hz": 20.0, "format": "las"},
     "ins": {"rate_hz": 100.0},
@@ -153,8 +153,8 @@ def test_a_head_that_moved_is_the_one_that_diff_names(session: Path, run: Path, 
     """The second session's second head was turned by half a degree; the first head stood still."""
     (tmp_path / "s").mkdir()
     moved = dict(SCENARIO, name="moved")
-    moved["mbes"] = [dict(head) for head in SCENARIO["mbes"]]  # type: ignore[attr-defined]
-    moved["mbes"][1]["mount"] = SECOND | {"yaw_deg": SECOND["yaw_deg"] + 0.5}  # type: ignore[index]
+    moved["mbes"] = [dict(head) for head in SCENARIO["mbes"]]
+    moved["mbes"][1]["mount"] = SECOND | {"yaw_deg": SECOND["yaw_deg"] + 0.5}
     (tmp_path / "moved.yaml").write_text(yaml.safe_dump(moved), encoding="utf-8")
     later = tmp_path / "s" / "session"
     assert poolcal("simulate", later, "--scenario", tmp_path / "moved.yaml", "--seed", 4).status == 0

@@ -8,7 +8,8 @@ from pipeline.adjustment.observation_model import ObservationModel
 from pipeline.artefacts.streams import MemoryPart, Stream
 from pipeline.config.session import Ins
 from pipeline.maths.adjustment.face_shifts import Faces
-from pipeline.maths.adjustment.parameters import ObservedSurface, State
+from pipeline.maths.adjustment.observed_surface import ObservedSurface
+from pipeline.maths.adjustment.parameters import State
 from tests.support.forward_points import FACES, LEVER_TRUE, QUIET, R_TRUE, made
 
 WALL = next(k for k, (family, *_) in enumerate(FACES) if family == "P2")
@@ -24,5 +25,5 @@ def made_of_wall(seed: int, ins: Ins = QUIET, sensors: float = 1.0) -> tuple[dic
         columns = {name: column[on] for name, column in batch.items()} | {"face": np.zeros(len(on), dtype=np.int16)}
         kept[sensor] = Stream((MemoryPart(sensor, columns),))
     wall = ObservedSurface.at("P2", np.array(FACES[WALL][1]), np.array(FACES[WALL][2]))
-    of_wall = {"faces": Faces(("P2",), np.array([0]), np.ones(1)), "height_of_face": np.zeros(1)}
-    return kept, replace(model, coarse=State.at(R_TRUE, LEVER_TRUE, [wall]), **of_wall)
+    faces, coarse = Faces(("P2",), np.array([0]), np.ones(1)), State.at(R_TRUE, LEVER_TRUE, [wall])
+    return kept, replace(model, coarse=coarse, faces=faces, height_of_face=np.zeros(1))
