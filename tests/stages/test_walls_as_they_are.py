@@ -57,7 +57,10 @@ def test_a_wet_face_that_is_off_is_left_out_and_named(errors_of: Any, off: dict[
     assert {family for family, _ in left_out(found)} == {"north"}
     assert {row["family"] for row in result["left_out"]} == {"north"}
     assert "face_left_out" in result["warning_codes"]
-    assert any("the soundings on north are left out" in words for words in result["warnings"])
+    (words,) = (words for words in result["warnings"] if "the soundings on north are left out" in words)
+    if "shift_m" in off:  # of the simulator: toward the boat
+        assert found["adjust/left_out"]["value"].iloc[0] == pytest.approx(off["shift_m"], abs=0.03)
+        assert "farther toward the boat than above" in words
     assert mount_within_its_sigmas(result, errors_of(result["mbes"], session.truth), 4.0)
     (soundings,) = (row["soundings"] for row in found["adjust/surfaces"].to_dict("records") if row["family"] == "north")
     assert soundings == 0
