@@ -10,7 +10,7 @@ from typing import Annotated
 import numpy as np
 import pandas as pd
 
-from pipeline.adjustment.consider import known_parameters, sonar_errors, wet_faces_uncertain
+from pipeline.adjustment.consider import known_parameters, sonar_errors
 from pipeline.adjustment.further_heads import in_passes
 from pipeline.adjustment.ins_drift import drift_model, drift_prior, pose_noise
 from pipeline.adjustment.iteration import MountAdjustment
@@ -20,6 +20,7 @@ from pipeline.adjustment.problem import CalibrationProblem, SessionData, sonar_p
 from pipeline.adjustment.residual_statistics import ResidualStatistics, residual_statistics
 from pipeline.adjustment.residual_tables import bins_table, map_table
 from pipeline.adjustment.result_tables import result_tables
+from pipeline.adjustment.wet_errors import outward_of, wet_faces_uncertain
 from pipeline.adjustment.wet_planes import adjust_true_faces
 from pipeline.artefacts.catalogue.points import FILES, INS_SIGMAS, PASSES, POSES
 from pipeline.artefacts.catalogue.results import (
@@ -172,10 +173,10 @@ def calibration_problem(session: SessionData, inputs: Inputs, config: Config) ->
         further = {head: mount_of(block.mount) for head, block in config.further_heads.items()}
         problem = sonar_problem(session, mount_of(config.mbes.mount), {"laser": laser, **heads}, further)
         state = problem.model.coarse
-        errors = sonar_errors(problem.model.names, laser, heads, as_built, session.target.depth_m)
+        outward, depth_m = outward_of(problem.model.faces, state), session.target.depth_m
+        errors = sonar_errors(problem.model.names, laser, heads, as_built, outward, depth_m)
         known = known_parameters(state, errors, config.adjust.free)
-        uncertain = wet_faces_uncertain(as_built.offset_sigma_m, as_built.angle_sigma_deg)
-        prior = replace(problem.prior, parameters=known, from_start=uncertain)
+        prior = replace(problem.prior, parameters=known, from_start=wet_faces_uncertain(as_built))
         return replace(problem, prior=prior, consider=errors)
     assert config.laser_fit is not None
     pose = target_frame(inputs.target_pose), float(np.radians(inputs.target_pose["azimuth_correction_deg"].iloc[0]))

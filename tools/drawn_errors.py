@@ -77,7 +77,7 @@ def _of_sensors(own: Draws, common: Draws) -> dict[str, dict[str, Any]]:
 def face_faults(target: TargetModel, draws: Draws, sigmas: AsBuilt = DEFAULTS) -> Iterator[dict[str, Any]]:
     """Yield faults of all faces: each stands out by its own error, and the wet ones of a family differ together.
 
-    The wet faces of a family shift, turn about one point as a rigid body, and bow.
+    The wet faces of a family shift, turn about one point as a rigid body, and bow. Growth is on all of them.
     """
     for face in target.faces:
         yield {"faces": [face.name], "shift_m": sigmas.face_sigma_m * draws.normal()}
@@ -88,6 +88,9 @@ def face_faults(target: TargetModel, draws: Draws, sigmas: AsBuilt = DEFAULTS) -
         yield from _rigid(target, family, wet, shift_m, turn_deg)
         if wet and not family.level:
             yield {"faces": [face.name for face in wet], "part": "wet", "bow_m": bow_m}
+    if sigmas.growth_sigma_m:
+        overgrown = [face.name for face in target.faces if _middle_m(target, face) is not None]
+        yield {"faces": overgrown, "part": "wet", "shift_m": sigmas.growth_sigma_m * draws.normal()}
 
 
 def _rigid(

@@ -7,12 +7,12 @@ pipeline/maths/adjustment/solution.py computes the total covariance C + S Q Sᵀ
 and ``Solution.total_covariance`` the sum.
 """
 
-import re
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.adjustment.wet_errors import wet_errors
 from pipeline.config.pool import AsBuilt
 from pipeline.config.session import Laser, Mbes
 from pipeline.maths.adjustment.design_matrix import SPEED_M_S
@@ -24,7 +24,6 @@ from pipeline.maths.mount_parameters import N_MOUNT
 Array = NDArray[np.float64]
 LEAST_SPAN_M = 0.1  # smallest depth and smallest span that count
 LASER_MOUNT = LASER_PARAMETERS[:N_MOUNT]
-BUILT_DEG, BUILT_M = 0.02, 0.002  # sigmas of a family's direction and place against the design
 ESTIMATED_WITH_PRIOR = (  # beginnings of the names
     "wet_", "mbes_range", "mbes_incidence", "mbes_level_range", "laser_incidence", "projector_",
     "sound_speed_gradient",
@@ -58,25 +57,8 @@ def gradient_sigma(mbes: Mbes, depth_m: float | None) -> float:
     return float(np.hypot(np.sqrt(2) * mbes.svp_sigma_m_s / span, max(1 - span / depth, 0.0) * without_cast))
 
 
-def wet_faces_uncertain(offset_sigma_m: float, angle_sigma_deg: float) -> bool:
-    """Return whether wet faces may stand farther off the dry ones than on an ordinary building site.
-
-    Then the search for weights must know of them: else the INS's drift makes up for what does not fit.
-    """
-    return offset_sigma_m > BUILT_M or angle_sigma_deg > BUILT_DEG
-
-
-def wet_sigmas(
-    names: Sequence[str], offset_sigma_m: float, angle_sigma_deg: float, bow_sigma_m: float = 0.0
-) -> dict[str, float]:
-    """Return the sigmas of the wet faces' shifts, turns and bows against the dry ones, m and rad, by parameter."""
-    lean = float(np.radians(angle_sigma_deg))
-    of_wet = {"turn_1": lean, "turn_2": lean, "shift": offset_sigma_m, "bow": bow_sigma_m}
-    return {name: sigma for name in names for end, sigma in of_wet.items() if re.fullmatch(f"wet_.*_{end}", name)}
-
-
 def laser_errors(names: Sequence[str], laser: Laser, as_built: AsBuilt) -> ConsiderErrors:
-    """Return the a-priori errors of the laser and of the wet faces, and zero for all other parameters.
+    """Return the a-priori errors of the laser and of single faces, and zero for all other parameters.
 
     If the session states a covariance of the laser's mount, it is one block.
 
@@ -87,7 +69,7 @@ def laser_errors(names: Sequence[str], laser: Laser, as_built: AsBuilt) -> Consi
     laser : Laser
         The session's laser.
     as_built : AsBuilt
-        Sigmas of the wet faces against the dry faces.
+        Sigmas of the faces.
     """
     mount, covariance = laser.mount_sigma, laser.mount_covariance
     mount_sigmas = [float(np.radians(mount.angle_deg))] * 3 + [mount.lever_arm_m] * 3
@@ -97,7 +79,6 @@ def laser_errors(names: Sequence[str], laser: Laser, as_built: AsBuilt) -> Consi
     sigmas |= {"laser_range": laser.range_bias_sigma_m, "laser_latency": laser.latency_sigma_s}
     sigmas["laser_incidence"] = laser.incidence_bias_sigma_m
     sigmas |= {name: as_built.face_sigma_m for name in names if name.startswith("face_")}
-    sigmas |= wet_sigmas(names, as_built.offset_sigma_m, as_built.angle_sigma_deg, as_built.bow_sigma_m)
     blocks = []
     if covariance is not None and LASER_MOUNT[0] in names:
         blocks = [(np.array([names.index(name) for name in LASER_MOUNT]), np.array(covariance))]
@@ -105,7 +86,12 @@ def laser_errors(names: Sequence[str], laser: Laser, as_built: AsBuilt) -> Consi
 
 
 def sonar_errors(
-    names: Sequence[str], laser: Laser, heads: Mapping[str, Mbes], as_built: AsBuilt, depth_m: float | None = None
+    names: Sequence[str],
+    laser: Laser,
+    heads: Mapping[str, Mbes],
+    as_built: AsBuilt,
+    outward: Mapping[str, float],
+    depth_m: float | None = None,
 ) -> ConsiderErrors:
     """Return the a-priori errors for a calibration of the sonar: zero for the sonar's mounts and the surfaces.
 
@@ -127,10 +113,12 @@ def sonar_errors(
         The heads of the sonar by name, the first one first.
     as_built : AsBuilt
         Sigmas of the wet faces against the dry ones.
+    outward : mapping of float
+        Which way the faces of each family look (:func:`pipeline.adjustment.wet_errors.outward_of`).
     depth_m : float, optional
         Depth of the target's lower end below the water.
     """
-    errors = laser_errors(names, laser, as_built)
+    errors, wet = laser_errors(names, laser, as_built), wet_errors(names, as_built, as_built.bow_sigma_m, outward)
     (first, mbes), *_ = heads.items()
     of_water = {
         "sound_speed": mbes.sound_speed_sigma_m_s / SPEED_M_S,
@@ -138,10 +126,10 @@ def sonar_errors(
     }
     of_heads = {"" if head == first else head: _own_errors(block) for head, block in heads.items()}
     sigmas = []
-    for name, sigma in zip(names, errors.sigmas.tolist(), strict=True):
+    for name, sigma in zip(names, (errors.sigmas + wet.sigmas).tolist(), strict=True):
         head, own = of_head(name)
         sigmas.append({**of_heads[head], **of_water}.get(own, sigma))
-    return ConsiderErrors(np.array(sigmas), errors.blocks)
+    return ConsiderErrors(np.array(sigmas), [*errors.blocks, *wet.blocks])
 
 
 def _own_errors(mbes: Mbes) -> dict[str, float]:
@@ -166,7 +154,7 @@ def known_parameters(state: State, errors: ConsiderErrors, free: Sequence[str]) 
     state : State
         A state, for the names of the parameters, in which they are zero.
     errors : ConsiderErrors
-        The a-priori errors; those of these parameters are independent.
+        The a-priori errors.
     free : sequence of str
         Parameters that are estimated without prior information.
     """
@@ -177,4 +165,4 @@ def known_parameters(state: State, errors: ConsiderErrors, free: Sequence[str]) 
     ]
     if not numbers:
         return None
-    return ParameterPrior(np.array(numbers), np.diag(errors.sigmas[numbers] ** 2), state)
+    return ParameterPrior(np.array(numbers), errors.covariance(np.array(numbers)), state)

@@ -13,16 +13,16 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from pipeline.adjustment.consider import BUILT_DEG, BUILT_M, known_parameters, wet_faces_uncertain, wet_sigmas
+from pipeline.adjustment.consider import known_parameters
 from pipeline.adjustment.problem import CalibrationProblem, designed_planes
 from pipeline.adjustment.two_starts import chosen_iteration
 from pipeline.adjustment.weighted_iteration import IterationSettings, WeightedIteration
+from pipeline.adjustment.wet_errors import BUILT_DEG, BUILT_M, outward_of, wet_errors, wet_faces_uncertain
 from pipeline.artefacts.sampling import sample_rows
 from pipeline.artefacts.streams import Batch, MemoryPart, Stream, point_array
 from pipeline.config.stage_settings import FacesAsBuilt
 from pipeline.maths.adjustment.pose_errors import N_POSE
 from pipeline.maths.adjustment.pseudo_observations import N_DISPLACEMENT, DesignPrior, displacement
-from pipeline.maths.adjustment.solution import ConsiderErrors
 from pipeline.maths.geometry.rotations import exp_so3, log_so3
 from pipeline.maths.target.model import TargetModel
 from pipeline.target.gate import fitting_gate_m
@@ -55,11 +55,10 @@ def uncertain_wet_faces(problem: CalibrationProblem, as_built: FacesAsBuilt) -> 
     Two wet walls that are turned against each other by 0.2° fit the dry ones only if the INS drifts by centimetres.
     Where they must fit, the provisional adjustment drifts so, and takes labels away with it.
     """
-    if not wet_faces_uncertain(as_built.offset_sigma_m, as_built.angle_sigma_deg):
+    if not wet_faces_uncertain(as_built):
         return problem
     state = problem.model.coarse
-    sigmas = wet_sigmas(state.names, as_built.offset_sigma_m, as_built.angle_sigma_deg)
-    errors = ConsiderErrors(np.array([sigmas.get(name, 0.0) for name in state.names]))
+    errors = wet_errors(state.names, as_built, 0.0, outward_of(problem.model.faces, state))
     known = known_parameters(state, errors, ())
     return replace(problem, prior=replace(problem.prior, parameters=known, from_start=True))
 

@@ -23,6 +23,16 @@ class AsBuilt(Model):
     offset_sigma_m: SigmaM = 0.001  # of a family's wet faces against the dry ones
     angle_sigma_deg: SigmaDeg = 0.01
     bow_sigma_m: SigmaM = 0.001
+    growth_sigma_m: SigmaM = 0.0  # of a layer of one thickness on all wet faces
+
+    @model_validator(mode="after")
+    def _growth_is_not_all(self) -> "AsBuilt":
+        if self.growth_sigma_m > 0 and self.offset_sigma_m == 0:
+            raise ValueError(
+                f"growth_sigma_m = {self.growth_sigma_m} with offset_sigma_m = 0: no layer is equally thick "
+                "everywhere; say in offset_sigma_m how far single walls may stand off besides"
+            )
+        return self
 
 
 class TargetPlace(Model):

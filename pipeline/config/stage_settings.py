@@ -82,6 +82,7 @@ class FacesAsBuilt(Model):
     faces: dict[str, float]
     offset_sigma_m: float
     angle_sigma_deg: float
+    growth_sigma_m: float
 
 
 class AdjustIteration(Model):

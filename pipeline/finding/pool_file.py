@@ -20,6 +20,7 @@ as_built:                       # of walls below the water that nobody has surve
   offset_sigma_m: 0.02
   angle_sigma_deg: 0.1
   bow_sigma_m: 0.005
+  growth_sigma_m: 0.015         # a layer of one thickness on all walls: half of the thickest that may be there
 """
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pipeline.adjustment.consider import known_parameters, sonar_errors
 from pipeline.adjustment.problem import faces_on_surfaces
 from pipeline.adjustment.weighted_iteration import estimated_columns
+from pipeline.adjustment.wet_errors import outward_of
 from pipeline.config.instruments import deep_merge
 from pipeline.config.plan import Budget, Pass, Plan
 from pipeline.config.pool import PoolConfig
@@ -165,7 +166,8 @@ def assess_plan(plan: Plan, pool: PoolConfig, session: SessionConfig) -> PlanAss
     depth = setting.model.depth_m
     faces = faces_on_surfaces(setting.model.faces, setting.state)
     names = (*setting.state.names, *faces.parameters)
-    considered = sonar_errors(names, session.laser, {"mbes": session.sonar}, pool.as_built, depth)
+    outward = outward_of(faces, setting.state)
+    considered = sonar_errors(names, session.laser, {"mbes": session.sonar}, pool.as_built, outward, depth)
     turn_s = plan.budget.turn_s if plan.budget is not None else Budget.model_fields["turn_s"].default
     free, prior = estimated_columns(setting.state, pool.adjust.free), np.zeros((setting.state.size, setting.state.size))
     known = known_parameters(setting.state, considered, pool.adjust.free)

@@ -41,7 +41,8 @@ def for_uncertain_faces(mount: ProvisionalMount, as_built: FacesAsBuilt, model: 
     if not np.isfinite(mount.scale_m):
         return mount
     lean_m = np.radians(as_built.angle_sigma_deg) * model.depth_m / 2
-    reach_m = WET_SIGMAS * float(np.linalg.norm([as_built.offset_sigma_m, lean_m, mount.scale_m]))
+    sigmas_m = [as_built.offset_sigma_m, as_built.growth_sigma_m, lean_m, mount.scale_m]
+    reach_m = WET_SIGMAS * float(np.linalg.norm(sigmas_m))
     return replace(mount, gate_m=max(mount.gate_m, min(reach_m, SHARE_OF_PERIOD * model.half_period_m)))
 
 

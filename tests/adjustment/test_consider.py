@@ -48,7 +48,7 @@ def test_each_bias_has_its_own_setting() -> None:
     expected = {"laser_incidence": 0.0007, "mbes_incidence": 0.002, "mbes_level_range": 0.006}
     expected |= dict.fromkeys(PROJECTOR_PARAMETERS, 0.004)
     expected |= dict.fromkeys(("sound_speed", "steering_speed"), 0.74 / 1480)
-    found = sonar_errors(list(expected), laser, {"mbes": mbes}, AsBuilt())
+    found = sonar_errors(list(expected), laser, {"mbes": mbes}, AsBuilt(), {})
     assert dict(zip(expected, found.sigmas, strict=True)) == pytest.approx(expected)
     assert not found.blocks  # independent of each other
 
@@ -57,5 +57,5 @@ def test_it_is_never_nothing_unless_it_is_said_to_be() -> None:
     laser = Laser(files=["a"], format="las", mount=MOUNT)
     cast = [[0.0, 1480.0], [4.0, 1480.0]]
     names = ["sound_speed_gradient"]
-    assert sonar_errors(names, laser, {"mbes": sonar(cast)}, AsBuilt(), 4.0).sigmas[0] > 0
-    assert sonar_errors(names, laser, {"mbes": sonar(cast, svp_sigma_m_s=0.0)}, AsBuilt(), 4.0).sigmas[0] == 0.0
+    assert sonar_errors(names, laser, {"mbes": sonar(cast)}, AsBuilt(), {}, 4.0).sigmas[0] > 0
+    assert sonar_errors(names, laser, {"mbes": sonar(cast, svp_sigma_m_s=0.0)}, AsBuilt(), {}, 4.0).sigmas[0] == 0.0

@@ -131,7 +131,7 @@ def test_a_lasers_mount_covariance_goes_in_whole_and_before_its_sigmas() -> None
     Q = root @ root.T
     block = tuple(map(tuple, Q.tolist()))
     laser = LASER.model_copy(update={"mount_covariance": block, "mount_sigma": MountSigma(angle_deg=40.0)})
-    errors = sonar_errors(names, laser, {"mbes": MBES}, AsBuilt())
+    errors = sonar_errors(names, laser, {"mbes": MBES}, AsBuilt(), {})
     sigmas = errors.sigmas
     six = [names.index(f"laser_{kind}_{axis}") for kind in ("rotation", "lever_arm") for axis in "xyz"]
     np.testing.assert_allclose(sigmas[six], np.sqrt(np.diag(Q)), rtol=1e-12)
@@ -141,7 +141,7 @@ def test_a_lasers_mount_covariance_goes_in_whole_and_before_its_sigmas() -> None
     without = found.solution.total_covariance(ConsiderErrors(others))
     extra = found.solution.total_covariance(errors) - without
     np.testing.assert_allclose(extra, S @ Q @ S.T, rtol=1e-6, atol=1e-14)
-    assert not sonar_errors(names, LASER, {"mbes": MBES}, AsBuilt()).blocks
+    assert not sonar_errors(names, LASER, {"mbes": MBES}, AsBuilt(), {}).blocks
 
 
 def test_a_laser_turned_about_the_ins_turns_the_sonar_with_it() -> None:

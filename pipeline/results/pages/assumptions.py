@@ -32,6 +32,7 @@ WET_FACES = {
     "as_built.offset_sigma_m": "wet faces against dry ones {} mm",
     "as_built.angle_sigma_deg": "their angle {}°",
     "as_built.bow_sigma_m": "their bow {} mm",
+    "as_built.growth_sigma_m": "growth on all of them {} mm",
 }
 LASER_FIT = {
     "laser_fit.face_sigma_deg": "directions of its faces {}°",
