@@ -25,13 +25,12 @@ import yaml
 from pipeline.config.pool import AsBuilt
 from pipeline.config.yaml_models import parse
 from pipeline.maths.comparison import mount_error
-from pipeline.report.reason_codes import WEAK_ALONE
 from pipeline.simulation.scenario import Scenario
 from pipeline.target.design import target_of
 from tools.campaign_files import collect_rows
-from tools.campaign_statistics import nse_band
 from tools.campaigns import DRIFT, TASKS_OF_A_WORKER
 from tools.drawn_errors import errors_at
+from tools.place_pages import differences, summary, summary_of_rough
 from tools.places import PLACES, scenario_of_place
 from tools.rough_walls import drawn_into, drawn_names
 from tools.session_rows import NAMES, error_columns
@@ -72,7 +71,7 @@ def row_of(task: Task) -> dict[str, Any]:
         config.write_text(yaml.safe_dump({"target": TARGET, "verdict": {"purpose": purpose}}), encoding="utf-8")
         _poolcal(["simulate", session, "--scenario", file, "--seed", task.seed], (0,))
         command = ["run", session, "--config", config, "--run", run, "--jobs", "1", "--no-report", "--no-recordings"]
-        said = _poolcal(command, (0, 1, 2))
+        _, said = _poolcal(command, (0, 1, 2))
         written = run / "report" / "calibration.json"
         if not written.is_file():
             return row | {"verdict": "no result", "reasons": said.strip().splitlines()[-1]}
@@ -80,7 +79,8 @@ def row_of(task: Task) -> dict[str, Any]:
         truth = json.loads(Path(f"{session}.truth.json").read_text("utf-8"))
         found = json.loads((run / "found.json").read_text("utf-8"))["found"]
         if task.planned:
-            row |= _predicted(session, found, scenario)
+            known = _as_it_is(found, scenario, row["fault"]) if task.rough else found
+            row |= _predicted(session, known, scenario, purpose)
         if task.drawn:
             row |= _by_drawing(session, calibration)
         if task.rough:
@@ -114,10 +114,13 @@ def _by_drawing(session: Path, by_finding: dict[str, Any]) -> dict[str, float]:
     return {f"apart_{name}": float(value) for name, value in zip(NAMES, apart, strict=True)}
 
 
-def _predicted(session: Path, found: dict[str, Any], scenario: dict[str, Any]) -> dict[str, float]:
-    """Return the total sigmas that ``poolcal plan`` predicts for these passes at the found faces, deg and mm."""
+def _predicted(session: Path, found: dict[str, Any], scenario: dict[str, Any], purpose: str) -> dict[str, Any]:
+    """Return the total sigmas that ``poolcal plan`` predicts for these passes at the found faces, deg and mm.
+
+    allowed: whether they, and what they make of soundings, are within the limits.
+    """
     pool, plan, out = (session.parent / name for name in ("found.yaml", "plan.yaml", "planned.yaml"))
-    pool.write_text(yaml.safe_dump(found), encoding="utf-8")
+    pool.write_text(yaml.safe_dump(found | {"verdict": {"purpose": purpose}}), encoding="utf-8")
     settings = parse(Scenario, scenario, "place")
     courses = settings.track.courses
     content = {
@@ -130,135 +133,31 @@ def _predicted(session: Path, found: dict[str, Any], scenario: dict[str, Any]) -
         ],
     }
     plan.write_text(yaml.safe_dump(content), encoding="utf-8")
-    _poolcal(["plan", plan, "--session", session, "--config", pool, "--yaml", out], (0, 1))
+    status, _ = _poolcal(["plan", plan, "--session", session, "--config", pool, "--yaml", out], (0, 1))
     sigmas = yaml.safe_load(out.read_text("utf-8"))["given"]["sigma_mount_total"] or {}
     keys = {"pitch": "pitch_deg", "roll": "roll_deg", "yaw": "yaw_deg", "x": "x_m", "y": "y_m", "z": "z_m"}
-    return {
+    return {"allowed": status == 0} | {
         f"planned_{name}": sigmas.get(key, np.nan) * (1000.0 if key.endswith("_m") else 1.0)
         for name, key in keys.items()
     }
 
 
-def _poolcal(words: list[Any], allowed: tuple[int, ...]) -> str:
+def _as_it_is(found: dict[str, Any], scenario: dict[str, Any], fault: str) -> dict[str, Any]:
+    """Return what was found with the walls' roughness stated, and without the false face."""
+    rough = scenario["surroundings"]
+    rms_m = float(np.hypot(rough["fouling_sigma_m"], rough["unevenness_m"]))
+    stated = {"roughness_m": rms_m, "roughness_length_m": rough["unevenness_length_m"]}
+    faces = found["target"]["faces"]
+    drawn = {name: drawn_names([name], found["target"], scenario["target"])[0] for name in faces}
+    true = {name: face for name, face in faces.items() if drawn[name] != fault}
+    return found | {"target": found["target"] | {"faces": true}, "as_built": found["as_built"] | stated}
+
+
+def _poolcal(words: list[Any], allowed: tuple[int, ...]) -> tuple[int, str]:
     done = subprocess.run([sys.executable, "-m", "stages.cli", *map(str, words)], capture_output=True, text=True)
     if done.returncode not in allowed:
         raise RuntimeError(done.stderr)
-    return done.stderr
-
-
-HEAD = """# Places that nobody has drawn
-
-Made by `python -m tools.place_campaign`, {sessions} sessions of each place. In each session `kind: found` finds the
-target in the laser's points. The INS drifts; all errors of the sensors are drawn by their sigmas; below the water each
-wall is off by 2 cm and 0.1°, and all are by 1.5 cm of growth (1 sigma), which nobody knows. The limits are those of
-`purpose: special_order`: 20 m, 60°. The lock is passed both ways with a head that looks down, the others one way with a
-head that looks to starboard.
-
-"""
-EXPLAINED = """
-The normalised squared error (NSE) by the total covariance is 6 in the mean if the sigmas are true. A session of which a
-test or a search says that something is wrong is rejected, and its NSE stands in the last column but one, not in the
-first. "Plan" is the total sigma that `poolcal plan` predicts for the same passes at the first session's faces.
-"""
-
-
-def summary(table: pd.DataFrame) -> str:
-    """Return the page of the places in Markdown."""
-    heads = (
-        "place", "accepted", "rejected for sigmas alone", "mean NSE of both (99 % band)", "worst error ÷ σ of accepted",
-        f"median total σ: {', '.join(NAMES)} (°, mm)", "σ ÷ plan's", "NSE of those otherwise rejected", "for",
-    )  # fmt: skip
-    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
-    lines += [_line(str(place), rows) for place, rows in table.groupby("place", sort=False)]
-    sessions = int(table.groupby("place").size().max())
-    return HEAD.format(sessions=sessions) + "\n".join(lines) + "\n" + EXPLAINED
-
-
-def _line(place: str, rows: pd.DataFrame) -> str:
-    codes = rows["codes"].fillna("no_result")
-    accepted = rows["verdict"] == "accepted"
-    weak = ~accepted & codes.map(lambda words: set(words.split()) <= WEAK_ALONE)
-    honest, others = rows[accepted | weak], rows[~(accepted | weak)]
-    errors, totals, planned = (
-        part[[f"{kind}_{name}" for name in NAMES]].to_numpy(float)
-        for kind, part in (("error", rows[accepted]), ("total", honest), ("planned", rows.iloc[:1]))
-    )
-    low, high = nse_band(max(len(honest), 1))
-    worst = np.abs(errors / rows.loc[accepted, [f"total_{name}" for name in NAMES]].to_numpy(float))
-    medians = np.median(totals, axis=0) if len(honest) else np.full(len(NAMES), np.nan)
-    against = (medians / planned)[0]
-    reasons = ", ".join(sorted({word for words in codes[others.index] for word in words.split()} - WEAK_ALONE))
-    cells = (
-        place, f"{int(accepted.sum())} of {len(rows)}", str(int(weak.sum())),
-        f"{honest['nse_total'].mean():.1f} ({low:.1f} to {high:.1f})", f"{worst.max():.1f}" if len(worst) else "",
-        ", ".join(f"{size:.3f}" if k < 3 else f"{size:.1f}" for k, size in enumerate(medians)),
-        ", ".join(f"{ratio:.2f}" for ratio in against),
-        ", ".join(f"{nse:.0f}" for nse in others["nse_total"]), reasons,
-    )  # fmt: skip
-    return f"| {' | '.join(cells)} |"
-
-
-ROUGH_HEAD = """# Walls as they are
-
-Made by `python -m tools.place_campaign --rough --only {places}`, {sessions} sessions of each place, as in
-[places](places.md), and beside it by seed: growth on the wet faces of up to 3 cm that varies by up to 1.5 cm, faces
-uneven by up to 3 mm, splash; two fenders and a ladder at the largest wall, a footing of 15 to 50 cm along it in every
-second session, a moored boat before it in three of ten. In every second session one wet face stands off by 8 to 30 cm,
-or is turned by 0.6 to 2°, which nobody knows. The limits are those of `purpose: order_1a`. `slip` is a wall with two
-returns between two slopes.
-
-"""
-ROUGH_EXPLAINED = """
-A false face is left out of the adjustment, or the faces are in doubt and the session is rejected; heights with a
-footing, a fender's end or splash are left out besides. Growth of one thickness on all walls looks like a lever arm: no
-test shows it, and `as_built.growth_sigma_m` (1.5 cm) has it in the sigmas.
-"""
-
-
-def summary_of_rough(table: pd.DataFrame) -> str:
-    """Return the page of the walls as they are in Markdown."""
-    heads = (
-        "place", "accepted", "worst error ÷ σ of accepted", "largest NSE of accepted", "rejected for sigmas alone",
-        "mean NSE of both", "otherwise rejected", "for", "false faces left out", "other faces left out",
-    )  # fmt: skip
-    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
-    groups = [(str(place), rows.reset_index(drop=True)) for place, rows in table.groupby("place", sort=False)]
-    lines += [_line_of_rough(place, rows) for place, rows in groups]
-    sessions = int(table.groupby("place").size().max())
-    head = ROUGH_HEAD.format(sessions=sessions, places=" ".join(place for place, _ in groups))
-    return head + "\n".join(lines) + "\n" + ROUGH_EXPLAINED
-
-
-def _line_of_rough(place: str, rows: pd.DataFrame) -> str:
-    codes, accepted = rows["codes"].fillna("no_result"), rows["verdict"] == "accepted"
-    weak = ~accepted & codes.map(lambda words: set(words.split()) <= WEAK_ALONE)
-    others = rows[~(accepted | weak)]
-    errors, totals = (
-        rows.loc[accepted, [f"{kind}_{name}" for name in NAMES]].to_numpy(float) for kind in ("error", "total")
-    )
-    worst = np.abs(errors / totals).max(initial=0.0)
-    reasons = ", ".join(sorted({word for words in codes[others.index] for word in words.split()} - WEAK_ALONE))
-    left_out = [set(str(names).split()) for names in rows["left_out"].fillna("")]
-    false = [fault for fault in rows["fault"] if fault]
-    pairs = list(zip(rows["fault"], left_out, strict=True))
-    found = sum(fault in names for fault, names in pairs if fault)
-    more = sum(len({name for name in names if not name.startswith("?")} - {fault}) for fault, names in pairs)
-    cells = (
-        place, f"{int(accepted.sum())} of {len(rows)}", f"{worst:.1f}", f"{rows.loc[accepted, 'nse_total'].max():.0f}",
-        str(int(weak.sum())), f"{rows.loc[accepted | weak, 'nse_total'].mean():.1f}", str(len(others)), reasons,
-        f"{found} of {len(false)}", str(more),
-    )  # fmt: skip
-    return f"| {' | '.join(cells)} |"
-
-
-def _differences(table: pd.DataFrame) -> str:
-    """Return a line for each place: how far the values on the found and on the drawn target differ, RMS in sigmas."""
-    lines = ["Values on the found target less those on the drawn one, RMS in total sigmas:", ""]
-    for place, rows in table.groupby("place", sort=False):
-        each = np.sqrt((rows[[f"apart_{name}" for name in NAMES]].to_numpy(float) ** 2).mean(axis=0))
-        named = ", ".join(f"{name} {size:.2f}" for name, size in zip(NAMES, each, strict=True))
-        lines.append(f"* {place} ({len(rows)} sessions): {named}; all {np.sqrt(np.mean(each**2)):.2f}")
-    return "\n".join(lines)
+    return done.returncode, done.stderr
 
 
 def main() -> None:
@@ -275,14 +174,14 @@ def main() -> None:
     for place in given.only or (ROUGH_PLACES if given.rough else PLACES):
         first = FIRST_SEED + 1000 * list(PLACES).index(place)
         tasks = [
-            Task(place, first + k, planned=k == 0 and not given.rough, drawn=given.drawn, rough=given.rough)
+            Task(place, first + k, planned=k == 0 or given.rough, drawn=given.drawn, rough=given.rough)
             for k in range(given.sessions)
         ]
         path = FOLDER / f"{'rough-' * given.rough}{place}.parquet"
         tables.append(collect_rows(path, row_of, tasks, given.jobs, given.resume, TASKS_OF_A_WORKER))
     print((summary_of_rough if given.rough else summary)(pd.concat(tables)), end="")
     if given.drawn:
-        print(_differences(pd.concat(tables)))
+        print(differences(pd.concat(tables)))
 
 
 if __name__ == "__main__":

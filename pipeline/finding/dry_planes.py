@@ -9,16 +9,19 @@ from numpy.typing import NDArray
 from pipeline.errors import RawDataError
 from pipeline.maths.surfaces.flatness import Flatness, cells_of, flatness, plane_axes
 from pipeline.maths.surfaces.growing import GrowthLimits, Plane, grown_regions, plane_of_voxels
-from pipeline.maths.surfaces.outline import convex_hull, inside, shrunk, simplified
+from pipeline.maths.surfaces.outline import area, convex_hull, inside, shrunk, simplified
 from pipeline.maths.surfaces.voxels import voxels_of
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 VOXEL_M, CELL_M = 0.3, 0.25
 FEWEST, FEWEST_CELLS, REFITS = 4, 8, 5  # points of a cell, cells of a plane, fits of a plane to its cells
 GROWTH = GrowthLimits(thickness_m=0.03, distance_m=0.06, least_voxels=12)
 OFF_M = 0.15  # points of a plane's voxels farther off belong to something in front of it
 SAMPLE = 4000  # points of a plane that are kept for pictures, up to twice as many
-MARGIN_M, CORNERS = 0.1, 8  # of the outline: inside the outermost points; most corners
+MARGIN_M, CORNERS = 0.1, 8  # of the outline: inside the outermost cells' means; most corners
+EDGE_CELL_M, EDGE_MARGIN_M = 0.1, 0.05  # the same of the last outline, where the points are dense enough
+BEYOND_M = VOXEL_M + MARGIN_M  # so far outside the first outline the last one may lie
 LEAST_M, UNEVEN_M, BOW_M, COVERED = 1.0, 0.03, 0.03, 0.6  # extent; RMS; height of a bow; share of the cells seen
 LEVEL_DEG = 10.0  # a plane that is less inclined is a deck, a quay's top or the water
 NEAR_WATER_M = 0.5  # largest height of a plane's lower end above the water
@@ -55,6 +58,11 @@ class DryPlane:
         """Return whether the plane is a deck, a quay's top or the water."""
         return min(self.tilt_deg, 180 - self.tilt_deg) < LEVEL_DEG
 
+    @property
+    def middle_m(self) -> Array:
+        """Return the middle (2,) of the outline's extent along the axes of the plane."""
+        return np.asarray((self.outline_m.min(axis=0) + self.outline_m.max(axis=0)) / 2)
+
     def corners_m(self, outline_m: Array) -> Array:
         """Return the corners (k, 3) of an outline (k, 2) in the plane."""
         return np.asarray(outline_m @ plane_axes(self.normal) + self.distance_m * self.normal)
@@ -72,21 +80,21 @@ def dry_planes(points_m: Array, boat_m: Array) -> list[DryPlane]:
     order = np.argsort(of_point, kind="stable")
     ends = np.searchsorted(of_point[order], np.arange(len(regions) + 1))
     found = [
-        _plane(points_m[order[ends[k] : ends[k + 1]]], plane_of_voxels(voxels, rows), boat_m)
+        _plane(points_m, order[ends[k] : ends[k + 1]], plane_of_voxels(voxels, rows), boat_m)
         for k, rows in enumerate(regions)
     ]
     return sorted(found, key=lambda plane: -plane.flat.width_m * plane.flat.height_m)
 
 
-def _plane(points_m: Array, grown: Plane, boat_m: Array) -> DryPlane:
-    """Return the plane of a region's points, toward the boat.
+def _plane(all_m: Array, rows: Integers, grown: Plane, boat_m: Array) -> DryPlane:
+    """Return the plane of a region, toward the boat; rows: of its points among all.
 
     A grown region goes round its corners: by 6 cm into the next wall, which turns the plane of 3 m by 0.4°. So the
     plane is fitted again, to the means of the cells that lie on it, until it stays.
     """
-    normal, distance_m = grown.normal, grown.distance_m
+    points_m, normal, distance_m = all_m[rows], grown.normal, grown.distance_m
     for _ in range(REFITS):
-        cells_m, outline = _cells_on(points_m, normal, distance_m)
+        cells_m, outline = _cells_on(points_m, normal, distance_m, CELL_M, MARGIN_M)
         used = cells_m[inside(outline, cells_m @ plane_axes(normal).T)]
         if len(outline) < 3 or len(used) < FEWEST_CELLS:
             break
@@ -95,7 +103,8 @@ def _plane(points_m: Array, grown: Plane, boat_m: Array) -> DryPlane:
         distance_m = float(normal @ mean)
     sense = 1.0 if normal @ boat_m > distance_m else -1.0
     normal, distance_m = sense * normal, sense * distance_m
-    cells_m, outline = _cells_on(points_m, normal, distance_m)
+    cells_m, outline = _cells_on(points_m, normal, distance_m, CELL_M, MARGIN_M)
+    outline = _near_the_edge(all_m, normal, distance_m, outline)
     away = points_m @ normal - distance_m
     on = np.abs(away) <= OFF_M
     in_plane, heights, away = points_m[on] @ plane_axes(normal).T, points_m[on, 2], away[on]
@@ -118,18 +127,36 @@ def _plane(points_m: Array, grown: Plane, boat_m: Array) -> DryPlane:
     return replace(made, refused=_refusal(made))
 
 
-def _cells_on(points_m: Array, normal: Array, distance_m: float) -> tuple[Array, Array]:
+def _near_the_edge(points_m: Array, normal: Array, distance_m: float, coarse: Array) -> Array:
+    """Return the outline (k, 2) of small cells, which loses less of the plane than the coarse one, if all have points.
+
+    Means of the outermost coarse cells lie up to half a cell inside the edge, and voxels at a corner belong to neither
+    wall: together a fifth of a narrow wall's points.
+    """
+    near = points_m[np.abs(points_m @ normal - distance_m) <= OFF_M]
+    if len(coarse):
+        in_plane, low, high = near @ plane_axes(normal).T, coarse.min(axis=0), coarse.max(axis=0)
+        near = near[np.all((in_plane > low - BEYOND_M) & (in_plane < high + BEYOND_M), axis=1)]
+    cells_m, fine = _cells_on(near, normal, distance_m, EDGE_CELL_M, EDGE_MARGIN_M)
+    if len(coarse) < 3 or len(cells_m) * EDGE_CELL_M**2 < COVERED * area(coarse):
+        return coarse
+    return fine
+
+
+def _cells_on(
+    points_m: Array, normal: Array, distance_m: float, cell_m: float, margin_m: float
+) -> tuple[Array, Array]:
     """Return the means (c, 3) of the points in each cell of a plane that lie on it, and their outline (k, 2).
 
     Single points far out make no cell.
     """
     away = points_m @ normal - distance_m
     points, axes = points_m[np.abs(away) <= OFF_M], plane_axes(normal)
-    _, inverse, count = cells_of(points @ axes.T, CELL_M)
+    _, inverse, count = cells_of(points @ axes.T, cell_m)
     sums = np.array([np.bincount(inverse, weights=axis, minlength=len(count)) for axis in points.T])
     means = (sums / count).T[count >= FEWEST]
     means = means[np.abs(means @ normal - distance_m) <= UNEVEN_M]
-    return means, simplified(shrunk(convex_hull(means @ axes.T), MARGIN_M), CORNERS)
+    return means, simplified(shrunk(convex_hull(means @ axes.T), margin_m), CORNERS)
 
 
 def _column_ends(along_m: Array, heights_m: Array) -> Array:

@@ -41,7 +41,7 @@ def table_rows(place: FoundPlace) -> list[list[str]]:
 def _row(name: str, plane: DryPlane, boat_m: tuple[float, float]) -> list[str]:
     lies, away = "-", "-"
     if len(plane.outline_m):
-        east, north = plane.corners_m(plane.outline_m.mean(axis=0)[None])[0, :2] - boat_m
+        east, north = plane.corners_m(plane.middle_m[None])[0, :2] - boat_m
         lies, away = f"{np.degrees(np.arctan2(east, north)) % 360:.0f}", f"{np.hypot(east, north):.1f}"
     looks = float(np.degrees(np.arctan2(plane.normal[0], plane.normal[1]))) % 360
     flat = plane.flat

@@ -4,6 +4,7 @@ It forms the same sums and equations as a session does. Candidates for a pass ar
 equations are added. This is exact except for the drift, which goes on from one pass to the next, and for the edge
 shares, which are each candidate's own and differ by some per cent. The laser's rays are thinned, and each has the
 weight of all rays that it represents. The INS records are not thinned, because each record has its own white noise.
+Roughness of the wet faces that is stated beforehand counts among the passes that are predicted together.
 """
 
 from collections.abc import Sequence
@@ -21,6 +22,8 @@ from pipeline.maths.adjustment.body_motion import BodyMotion
 from pipeline.maths.adjustment.face_shifts import equations_with_faces
 from pipeline.maths.adjustment.interval_sums import IntervalSums, merged
 from pipeline.maths.adjustment.normal_equations import Linearisation, normal_equations
+from pipeline.maths.adjustment.ping_noise import DesignEffects, with_design_effects
+from pipeline.maths.adjustment.roughness import expected_roughness
 from pipeline.maths.adjustment.weighting import edge_shares, rescaled
 from pipeline.maths.geometry.rotations import rotation_from_attitude
 from pipeline.maths.geometry.trajectory import Trajectory
@@ -161,11 +164,21 @@ def _normal(setting: PredictionSetting, passes: Sequence[PassSums], turn_s: floa
         for sensor, of_sensor in sums.items()
     }
     shares = {sensor: edge_shares(one, len(setting.state.surfaces)) for sensor, one in by_surface.items()}
+    added = _roughness(setting, rescaled(by_surface["mbes"], shares["mbes"]))
     if single_faces:
         by_face = {sensor: rescaled(one, shares[sensor][faces.surface]) for sensor, one in sums.items()}
+        by_face["mbes"] = with_design_effects(by_face["mbes"], DesignEffects(*[1 + added[faces.surface]] * 2))
         return equations_with_faces(Linearisation(by_face, setting.state, body, drift), faces, drift, noise).normal
     by_surface = {sensor: rescaled(one, shares[sensor]) for sensor, one in by_surface.items()}
+    by_surface["mbes"] = with_design_effects(by_surface["mbes"], DesignEffects(1 + added, 1 + added))
     return normal_equations(Linearisation(by_surface, setting.state, body, drift), drift, noise).normal
+
+
+def _roughness(setting: PredictionSetting, soundings: IntervalSums) -> Array:
+    """Return what the wet faces' roughness adds to the design effects (s,) of these passes' soundings."""
+    weight = np.zeros(len(setting.state.surfaces))
+    np.add.at(weight, soundings.surface, soundings.normal[:, 0, 0])
+    return expected_roughness(weight, setting.wet_areas_m2(), setting.roughness_m, setting.roughness_length_m)
 
 
 def planned_track(setting: PredictionSetting, planned: Pass, number: int) -> Array:

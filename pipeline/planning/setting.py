@@ -2,6 +2,9 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from pipeline.adjustment.problem import designed_surfaces
 from pipeline.config.plan import Plan
 from pipeline.config.pool import PoolConfig, Segment
@@ -12,11 +15,16 @@ from pipeline.mount import mount_of
 from pipeline.target.design import target_of
 
 BEYOND_M = 2.0  # from the last block to the end of a pass
+CELL_M = 0.1  # side of the cells by which a face's wet area is found
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class PredictionSetting:
-    """Target and instruments, which are the same for all passes of a plan."""
+    """Target and instruments, which are the same for all passes of a plan.
+
+    roughness_m, roughness_length_m: RMS of the wet faces about their planes, and the length over which it is alike.
+    """
 
     model: TargetModel
     state: State
@@ -25,12 +33,22 @@ class PredictionSetting:
     ins: Ins
     laser: Laser
     mbes: Mbes
+    roughness_m: float = 0.0
+    roughness_length_m: float = 0.3
 
     @property
     def half_length_m(self) -> float:
         """Length of a pass on either side of the target's centre."""
         low, high = self.model.bounds()
         return float(max(-low[1], high[1])) + BEYOND_M
+
+    def wet_areas_m2(self) -> Array:
+        """Return the area (s,) of each surface's faces under water."""
+        areas, number = np.zeros(len(self.state.surfaces)), {s.family: k for k, s in enumerate(self.state.surfaces)}
+        for face in self.model.faces:
+            centres_m, cell_m2 = face.cells(CELL_M)
+            areas[number[face.family]] += cell_m2 * np.sum(centres_m[:, 2] < self.model.water_level_m)
+        return areas
 
 
 def setting_of(plan: Plan, pool: PoolConfig, session: SessionConfig) -> PredictionSetting:
@@ -44,6 +62,8 @@ def setting_of(plan: Plan, pool: PoolConfig, session: SessionConfig) -> Predicti
         ins=session.ins,
         laser=session.laser,
         mbes=mbes,
+        roughness_m=pool.as_built.roughness_m,
+        roughness_length_m=pool.as_built.roughness_length_m,
     )
 
 

@@ -26,6 +26,12 @@ A short wall has few long blocks. So its short blocks say how rough it is, and a
 how much s V(s) grows from there, the most of all sizes. Where the long blocks of one wall say more, they hold. A wall
 too short for any block is as rough as the roughest of the others, by its own weight per length.
 
+Before anything is sailed, G follows from a field of the RMS r, the same in all directions, with the correlation
+exp(-d² / 2 l²) at a distance d. The mean over a line of height H has the covariance ∫ C dz / H with another if H is
+long beside l, so G = ∫∫ C dz dt / H = 2π r² l² / H, and with the area A = H L
+
+    ω G = Σ W / A · 2π r² l².
+
 The slopes of the lines along the wall's height have the same form, with Σ w τ² as weights. Of a field that is alike
 over less than the wall's height both add the same: the weight of soundings per area times ∫ C over the area. So the
 larger of the two holds for means and slopes.
@@ -64,6 +70,24 @@ class Roughness:
     def effects(self) -> DesignEffects:
         """Return the design effects of roughness beside the sensor's noise."""
         return DesignEffects(1 + self.added, 1 + self.added)
+
+
+def expected_roughness(weight: Array, area_m2: Array, rms_m: float, length_m: float) -> Array:
+    """Return what roughness that is known beforehand adds to the design effects (s,) of surfaces.
+
+    Parameters
+    ----------
+    weight : (s,) array
+        Σ W of all soundings on each surface, 1/m².
+    area_m2 : (s,) array
+        Their areas under water; nothing is added where it is zero.
+    rms_m : float
+        RMS r of the surfaces about their planes, m.
+    length_m : float
+        Length l over which they are alike, m.
+    """
+    per_area = np.divide(weight, area_m2, out=np.zeros(len(weight)), where=area_m2 > 0)
+    return np.asarray(per_area * 2 * np.pi * rms_m**2 * length_m**2)
 
 
 def roughness(

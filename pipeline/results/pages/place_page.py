@@ -57,9 +57,10 @@ def _plan(place: FoundPlace) -> Markup:
         colour, width = (INK, 2.2) if name else (QUIET, 0.8)
         axes.plot(*np.vstack([corners, corners[:1]]).T, color=colour, linewidth=width)
         if name:
-            middle, toward = corners.mean(axis=0), plane.normal[:2]
+            toward = plane.normal[:2]
+            east, north = plane.corners_m(plane.middle_m[None])[0, :2] - place.boat_m - BEHIND_M * toward
             beside = "right" if toward[0] > 0 else "left"  # behind the face, away from the boat
-            axes.annotate(f" {name} ", middle - BEHIND_M * toward, ha=beside, va="center", color=INK)
+            axes.annotate(f" {name} ", (east, north), ha=beside, va="center", color=INK)
     axes.set(xlabel="east, m", ylabel="north, m")
     axes.set_aspect("equal", adjustable="datalim")
     axes.legend(frameon=False, loc="best")
@@ -88,7 +89,7 @@ def _elevation(axes: Axes, face: FoundFace, place: FoundPlace) -> PathCollection
     """Draw one face; return its dots, for the colours."""
     plane = face.plane
     along, height, off = plane.sample_m.T
-    middle = float(plane.outline_m[:, 0].mean())
+    middle = float(plane.middle_m[0])
     dots = axes.scatter(
         along - middle, height - place.level_m, c=1000 * off, s=1.2, linewidths=0, rasterized=True,
         cmap=OFF_COLOURS, vmin=-OFF_MM, vmax=OFF_MM,
