@@ -80,7 +80,7 @@ def row_of(task: Task) -> dict[str, Any]:
         found = json.loads((run / "found.json").read_text("utf-8"))["found"]
         if task.planned:
             known = _as_it_is(found, scenario, row["fault"]) if task.rough else found
-            row |= _predicted(session, known, scenario, purpose)
+            row |= _predicted(session, known, scenario, purpose, calibration["mbes"]["mount"])
         if task.drawn:
             row |= _by_drawing(session, calibration)
         if task.rough:
@@ -114,12 +114,19 @@ def _by_drawing(session: Path, by_finding: dict[str, Any]) -> dict[str, float]:
     return {f"apart_{name}": float(value) for name, value in zip(NAMES, apart, strict=True)}
 
 
-def _predicted(session: Path, found: dict[str, Any], scenario: dict[str, Any], purpose: str) -> dict[str, Any]:
+def _predicted(
+    session: Path, found: dict[str, Any], scenario: dict[str, Any], purpose: str, mount: dict[str, float] | None
+) -> dict[str, Any]:
     """Return the total sigmas that ``poolcal plan`` predicts for these passes at the found faces, deg and mm.
 
-    allowed: whether they, and what they make of soundings, are within the limits.
+    allowed: whether they, and what they make of soundings, are within the limits. mount: that the session gave, because
+    walls of one direction show yaw by its sine; None: the coarse one.
     """
-    pool, plan, out = (session.parent / name for name in ("found.yaml", "plan.yaml", "planned.yaml"))
+    pool, plan, out, place = (session.parent / name for name in ("found.yaml", "plan.yaml", "planned.yaml", "planned"))
+    settled = yaml.safe_load((session / "session.yaml").read_text("utf-8"))
+    settled["mbes"]["mount"] = mount or settled["mbes"]["mount"]
+    place.mkdir()
+    (place / "session.yaml").write_text(yaml.safe_dump(settled), encoding="utf-8")
     pool.write_text(yaml.safe_dump(found | {"verdict": {"purpose": purpose}}), encoding="utf-8")
     settings = parse(Scenario, scenario, "place")
     courses = settings.track.courses
@@ -133,7 +140,7 @@ def _predicted(session: Path, found: dict[str, Any], scenario: dict[str, Any], p
         ],
     }
     plan.write_text(yaml.safe_dump(content), encoding="utf-8")
-    status, _ = _poolcal(["plan", plan, "--session", session, "--config", pool, "--yaml", out], (0, 1))
+    status, _ = _poolcal(["plan", plan, "--session", place, "--config", pool, "--yaml", out], (0, 1))
     sigmas = yaml.safe_load(out.read_text("utf-8"))["given"]["sigma_mount_total"] or {}
     keys = {"pitch": "pitch_deg", "roll": "roll_deg", "yaw": "yaw_deg", "x": "x_m", "y": "y_m", "z": "z_m"}
     return {"allowed": status == 0} | {

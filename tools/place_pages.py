@@ -19,7 +19,8 @@ head that looks to starboard.
 EXPLAINED = """
 The normalised squared error (NSE) by the total covariance is 6 in the mean if the sigmas are true. A session of which a
 test or a search says that something is wrong is rejected, and its NSE stands in the last column but one, not in the
-first. "Plan" is the total sigma that `poolcal plan` predicts for the same passes at the first session's faces.
+first. "Plan" is the total sigma that `poolcal plan` predicts for the same passes at the first session's faces, with the
+mount that it gave: walls that look one way show yaw by its sine.
 """
 
 
