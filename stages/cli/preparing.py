@@ -44,6 +44,7 @@ def _target(
     session: Session,
     out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="write a pool's config with them")] = None,
     html: Annotated[Path | None, typer.Option("--html", metavar="FILE", help="a page with pictures of them")] = None,
+    rrd: Annotated[Path | None, typer.Option("--rrd", metavar="FILE", help="write a recording of them")] = None,
     depth: Annotated[
         float | None, typer.Option("--depth", metavar="M", help="depth of the water at the wall; default: 4")
     ] = None,
@@ -57,13 +58,13 @@ def _target(
     if bottom is not None:
         from stages.commands import target_bottom
 
-        for option, given in (("--depth", depth), ("--html", html)):
+        for option, given in (("--depth", depth), ("--html", html), ("--rrd", rrd)):
             if given is not None:
                 raise ConfigError(f"{option} {given}: not with --bottom, which takes the run's faces; leave it out")
         return target_bottom.command(session, bottom, out, jobs)
     from stages.commands import target
 
-    return target.command(session, out, html, depth, jobs)
+    return target.command(session, target.TargetOutputs(out, html, rrd), depth, jobs)
 
 
 @app.command("plan")

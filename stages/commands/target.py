@@ -1,6 +1,7 @@
 """``poolcal target``: walls and slopes that can serve as a target, found in a session's laser points."""
 
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.atomic_files import write_text
@@ -16,17 +17,24 @@ from pipeline.run.output_files import refuse_output
 from pipeline.run.workers import workers
 
 
-def command(folder: Path, out: Path | None, html: Path | None, depth_m: float | None, jobs: int | None) -> int:
-    """Print the planes that were found; write them as a pool's config, and as a page with pictures.
+@dataclass(frozen=True)
+class TargetOutputs:
+    """Files to write, None: none: a pool's config, a page with pictures, a recording."""
+
+    out: Path | None
+    html: Path | None
+    rrd: Path | None
+
+
+def command(folder: Path, outputs: TargetOutputs, depth_m: float | None, jobs: int | None) -> int:
+    """Print the planes that were found; write them as a pool's config, as a page with pictures, as a recording.
 
     Parameters
     ----------
     folder
         The session folder.
-    out
-        The config to write; None: none is written.
-    html
-        The page to write; None: none is written.
+    outputs
+        The files to write.
     depth_m
         Depth below the water to which faces are continued; None: the usual one.
     jobs
@@ -36,18 +44,25 @@ def command(folder: Path, out: Path | None, html: Path | None, depth_m: float | 
     depth_m = DEPTH_M if depth_m is None else depth_m
     if not least <= depth_m <= most:
         raise ConfigError(f"--depth {depth_m:g}: must be {least:g} to {most:g} m, the depth of the water at the wall")
-    refuse_output("--out", out, suffix=".yaml", begins=FIRST.encode())
-    refuse_output("--html", html, folder, begins=b"<!doctype html>")
+    refuse_output("--out", outputs.out, suffix=".yaml", begins=FIRST.encode())
+    refuse_output("--html", outputs.html, folder, begins=b"<!doctype html>")
+    refuse_output("--rrd", outputs.rrd, folder)
     session = load_session(folder, with_cast)
     with workers(jobs, None) as pool:
         place = place_in(folder, session, depth_m, pool)
-    say(table_text(place), sys.stdout)
-    if out is not None:
-        write_text(out, pool_yaml(place))
-        say(f"\nWritten: {out}", sys.stdout)
-    if html is not None:
+    said = table_text(place)
+    say(said, sys.stdout)
+    if outputs.out is not None:
+        write_text(outputs.out, pool_yaml(place))
+    if outputs.html is not None:
         from pipeline.results.pages.place_page import place_page  # a second to import, and few want a page
 
-        write_text(html, place_page(place, session.name))
-        say(f"\nWritten: {html}", sys.stdout)
+        write_text(outputs.html, place_page(place, session.name))
+    if outputs.rrd is not None:
+        from stages.views.place import save_place
+
+        save_place(place, said, outputs.rrd)
+    for file in (outputs.out, outputs.html, outputs.rrd):
+        if file is not None:
+            say(f"\nWritten: {file}", sys.stdout)
     return 0

@@ -120,6 +120,20 @@ def two_runs_blueprint() -> Any:
     )
 
 
+def place_blueprint() -> Any:
+    """Return the layout for a found place: its planes, the faces alone, and the table."""
+    import rerun.blueprint as rrb
+
+    def tab(name: str, title: str, *contents: str) -> Any:
+        words = _words("/tables/place", "Planes")
+        return rrb.Vertical(_scene_of(title, *contents), words, row_shares=[2, 1], name=name)
+
+    return _blueprint(
+        tab("Place", "Faces, and planes that cannot serve", "/**"),
+        tab("Faces alone", "Faces", "/faces/**", "/track/**"),
+    )
+
+
 def _blueprint(*tabs: Any, timeline: str = "iteration") -> Any:
     import rerun.blueprint as rrb
 

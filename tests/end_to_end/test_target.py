@@ -2,12 +2,15 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 
 from pipeline.config.load import load_pool
+from pipeline.finding.dry_planes import OFF_M
 from tests.support.docks import DOCK
 from tests.support.places import poolcal, simulate
+from tests.support.recordings import points, read, strip, text
 from tests.support.refusals import one_line
 
 
@@ -62,3 +65,28 @@ def test_the_page_replaces_itself_and_nothing_else(dock: Path, tmp_path: Path) -
     one_line(poolcal("target", dock, "--html", page), str(page))
     assert page.read_text("utf-8") == "mine"
     one_line(poolcal("target", dock, "--html", dock / "place.html"), "place.html")
+
+
+def test_the_recording_shows_each_face_where_it_stands(dock: Path, tmp_path: Path) -> None:
+    """Its points lie on it, above the water, over its whole width."""
+    folder = tmp_path / "place"
+    folder.mkdir()
+    file = folder / "place.rrd"
+    for _ in range(2):  # a recording replaces itself
+        told = poolcal("target", dock, "--rrd", file)
+        assert told.status == 0, told.err
+    assert f"Written: {file}" in told.out
+    found = read(tmp_path, "place")
+    assert {path for path in found if path.endswith("/outline")} == {f"/faces/wall-{k}/outline" for k in (1, 2, 3)}
+    assert "wall-2" in text(found, "/tables/place")
+    cloud, below = points(found["/faces/wall-2/points"]), strip(found["/faces/wall-2/below"])
+    normal = np.cross(below[1] - below[0], below[2] - below[0])
+    normal /= np.linalg.norm(normal)
+    off_m = np.abs((cloud - below[0]) @ normal)
+    assert np.median(off_m) < 0.01
+    assert off_m.max() <= OFF_M + 0.01  # what stands before it is shown, too
+    assert np.quantile(cloud[:, 2], [0.01, 0.99]) == pytest.approx([0.0, 2.0], abs=0.15)  # the wall above the water
+    assert below[:, 2].min() == pytest.approx(-4.0, abs=0.1)
+    assert np.ptp(cloud[:, :2] @ np.array([-normal[1], normal[0]])) == pytest.approx(6.0, abs=0.3)
+    one_line(poolcal("target", dock, "--rrd", dock / "place.rrd"), "place.rrd")
+    one_line(poolcal("target", dock, "--rrd", file, "--bottom", tmp_path), "--rrd", "not with --bottom")

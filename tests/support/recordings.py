@@ -27,6 +27,12 @@ def points(chunks: list[Any]) -> np.ndarray:
     return np.array([point for row in lists for point in row])
 
 
+def strip(chunks: list[Any]) -> np.ndarray:
+    """Return the corners (k, 3) of a single line strip."""
+    ((corners,),) = [row for chunk in chunks for row in chunk.column("LineStrips3D:strips").to_pylist()]
+    return np.array(corners)
+
+
 def text(found: Chunks, path: str) -> str:
     (chunk,) = found[path]
     ((written,),) = chunk.column("TextDocument:text").to_pylist()
