@@ -7,6 +7,7 @@ change faster than its maker says, a beam's steering errs with its neighbours', 
 from typing import Any
 
 from tools.campaigns import CAMPAIGNS, DRIFT, Campaign
+from tools.course_campaigns import COURSES
 
 
 def _drifting(figures: dict[str, float]) -> dict[str, Any]:
@@ -46,7 +47,7 @@ STRESS = (
     Campaign("steering noise", 100, 14600, {"ins": DRIFT, "mbes": {"steering_sigma_deg": 0.06}}),  # 0.8 alike
     Campaign("perfect INS", 100, 14800, PERFECT_INS),
 )
-ALL = (*CAMPAIGNS, *STRESS)
+ALL = (*CAMPAIGNS, *STRESS, *COURSES)
 
 
 def named(*beginnings: str) -> tuple[Campaign, ...]:
