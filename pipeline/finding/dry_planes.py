@@ -10,7 +10,7 @@ from pipeline.errors import RawDataError
 from pipeline.maths.surfaces.flatness import Flatness, cells_of, flatness, plane_axes
 from pipeline.maths.surfaces.growing import GrowthLimits, Plane, grown_regions, plane_of_voxels
 from pipeline.maths.surfaces.outline import convex_hull, inside, shrunk, simplified
-from pipeline.maths.surfaces.voxels import voxels_of
+from pipeline.maths.surfaces.voxels import voxels_with_rows
 
 Array = NDArray[np.float64]
 VOXEL_M, CELL_M = 0.3, 0.25
@@ -22,7 +22,7 @@ MARGIN_M, CORNERS = 0.1, 8  # of the outline: inside the outermost points; most 
 LEAST_M, UNEVEN_M, BOW_M, COVERED = 1.0, 0.03, 0.03, 0.6  # extent; RMS; height of a bow; share of the cells seen
 LEVEL_DEG = 10.0  # a plane that is less inclined is a deck, a quay's top or the water
 NEAR_WATER_M = 0.5  # largest height of a plane's lower end above the water
-COLUMN_SPREAD_M, FEWEST_COLUMNS = 0.1, 6  # columns of points that end at the water
+COLUMN_SPREAD_M, FEWEST_COLUMNS, FULL = 0.1, 6, 20  # columns of points that end at the water; points of a column
 
 
 @dataclass(frozen=True)
@@ -62,9 +62,8 @@ class DryPlane:
 
 def dry_planes(points_m: Array, boat_m: Array) -> list[DryPlane]:
     """Return the planes among points (n, 3), the largest first; boat_m (3,): where the boat was in the mean."""
-    voxels = voxels_of(points_m, VOXEL_M)
+    voxels, row = voxels_with_rows(points_m, VOXEL_M)
     regions = grown_regions(voxels, GROWTH)
-    row = np.searchsorted(voxels.code, voxels.code_of(points_m))
     number = np.full(len(voxels), -1)
     for k, rows in enumerate(regions):
         number[rows] = k
@@ -135,11 +134,10 @@ def _cells_on(points_m: Array, normal: Array, distance_m: float) -> tuple[Array,
 def _column_ends(along_m: Array, heights_m: Array) -> Array:
     """Return the height (c,) of the lowest points of each column of a cell's width that has points enough."""
     column = np.floor(along_m / CELL_M).astype(np.int64)
-    order = np.lexsort((heights_m, column))
-    starts = np.flatnonzero(np.diff(column[order], prepend=column.min(initial=0) - 1))
-    counts = np.diff(starts, append=len(order))
-    use = counts >= 20
-    return np.asarray(heights_m[order][starts[use] + counts[use] // 50])
+    counts = np.bincount(column - column.min(initial=0))
+    order = np.argsort(column, kind="stable")
+    columns = np.split(heights_m[order], np.cumsum(counts)[:-1])
+    return np.array([np.partition(one, len(one) // 50)[len(one) // 50] for one in columns if len(one) >= FULL])
 
 
 def _refusal(plane: DryPlane) -> str:
