@@ -30,7 +30,8 @@ def main() -> None:
     print("| | s | cpu s | peak MiB |", "|---|---:|---:|---:|", sep="\n")
     print(_row("bare decoding", decoding), _row("finding a target", finding), sep="\n")
     ratios = [(find.wall_s / decode.wall_s, find.cpu_s / decode.cpu_s) for decode, find in turns]
-    print("| finding ÷ decoding | " + " | ".join(f"{statistics.median(one):.2f}" for one in zip(*ratios, strict=True)), "| |")
+    wall, cpu = (statistics.median(one) for one in zip(*ratios, strict=True))
+    print(f"| finding ÷ decoding | {wall:.2f} | {cpu:.2f} | |")
     print(f"\nmemory of all processes of finding together: {memory_together(find):.0f} MiB")
 
 

@@ -11,13 +11,14 @@ import logging
 import struct
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.artefacts.sampling import ALL, scattered
 from pipeline.artefacts.streams import BATCH_ROWS, Chunk
 from pipeline.config.recording import LasTime
 from pipeline.errors import RawDataError
@@ -54,6 +55,7 @@ class LasPart:
     gps_week: int | None  # None: adjusted standard time
     declared_time: LasTime
     first_s: float
+    limit: int = ALL  # points whose times draw a larger number are left out, before their frame is left
 
     def chunks(self) -> Iterator[Chunk]:
         """Yield the points in canonical columns, batch by batch."""
@@ -86,8 +88,13 @@ class LasPart:
         rows.columns["t_ns"] = self._gps_ns(rows) - latency_ns(self.latency_s)
         if first:
             refuse_other_crs(self.frame, self.crs, (rows["x_m"], rows["y_m"], rows["z_m"]), self.name)
+        usable = len(rows)
+        if self.limit < ALL:
+            drawn = np.flatnonzero(scattered(rows["t_ns"]) <= np.uint64(self.limit))
+            rows.columns = {name: values[drawn] for name, values in rows.columns.items()}
+        undrawn = usable - len(rows)
         transform_to_ecef(rows, self.frame, self.name)
-        return chunk(rows.columns, LASER_COLUMNS, dropped)
+        return replace(chunk(rows.columns, LASER_COLUMNS, dropped), undrawn=undrawn)
 
     def _gps_ns(self, rows: RowFilter) -> NDArray[np.int64]:
         if self.gps_week is None:
