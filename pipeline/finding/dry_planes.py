@@ -2,10 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.artefacts.streams import Mapper, serial
 from pipeline.errors import RawDataError
 from pipeline.maths.surfaces.flatness import Flatness, cells_of, flatness, plane_axes
 from pipeline.maths.surfaces.growing import GrowthLimits, Plane, grown_regions, plane_of_voxels
@@ -60,8 +62,18 @@ class DryPlane:
         return np.asarray(outline_m @ plane_axes(self.normal) + self.distance_m * self.normal)
 
 
-def dry_planes(points_m: Array, boat_m: Array) -> list[DryPlane]:
-    """Return the planes among points (n, 3), the largest first; boat_m (3,): where the boat was in the mean."""
+def dry_planes(points_m: Array, boat_m: Array, mapper: Mapper = serial) -> list[DryPlane]:
+    """Return the planes among points (n, 3), the largest first.
+
+    Parameters
+    ----------
+    points_m : (n, 3) array
+        The points, z up.
+    boat_m : (3,) array
+        Where the boat was in the mean.
+    mapper : Mapper, optional
+        Spreads the planes on the memory of this process.
+    """
     voxels, row = voxels_with_rows(points_m, VOXEL_M)
     regions = grown_regions(voxels, GROWTH)
     number = np.full(len(voxels), -1)
@@ -70,10 +82,9 @@ def dry_planes(points_m: Array, boat_m: Array) -> list[DryPlane]:
     of_point = number[row]
     order = np.argsort(of_point, kind="stable")
     ends = np.searchsorted(of_point[order], np.arange(len(regions) + 1))
-    found = [
-        _plane(points_m[order[ends[k] : ends[k + 1]]], plane_of_voxels(voxels, rows), boat_m)
-        for k, rows in enumerate(regions)
-    ]
+    points = (points_m[order[ends[k] : ends[k + 1]]] for k in range(len(regions)))
+    grown = (plane_of_voxels(voxels, rows) for rows in regions)
+    found = mapper(partial(_plane, boat_m=boat_m), points, grown)
     return sorted(found, key=lambda plane: -plane.flat.width_m * plane.flat.height_m)
 
 

@@ -16,6 +16,7 @@ from pipeline.finding.place import FoundPlace, found_place
 from pipeline.finding.reading import read_files
 from pipeline.finding.without_drift import track_without_drift
 from pipeline.maths.adjustment.pose_errors import PoseNoise
+from pipeline.maths.geometry.trajectory import Trajectory
 from pipeline.mount import mount_of
 
 TRACK = 2000  # places of the boat that are kept for pictures
@@ -36,18 +37,27 @@ def find_place(ins: Stream, laser: Stream, session: SessionConfig, depth_m: floa
     """
     records, sigmas, drawn = read_files(ins, laser)
     context, mount = level_context(records), mount_of(session.laser.mount)
+    _load(context.trajectory)
     points = kept_points(drawn, context, narrow(LaserPlacement, session.laser))
     boat_m = context.trajectory.positions_m.mean(axis=0)
     some = points.level_m[:: max(1, len(points) // PROVISIONAL)]
-    serving = [plane for plane in dry_planes(some, boat_m) if not plane.refused]
+    serving = [plane for plane in dry_planes(some, boat_m, laser.here) if not plane.refused]
     noise = _pose_noise(session, sigmas, records["t_ns"].to_numpy())
     trajectory = track_without_drift(points, serving, mount, narrow(LaserPoints, session.laser), noise, laser.here)
-    planes = dry_planes(points.along(trajectory, mount).level_m, boat_m)
+    planes = dry_planes(points.along(trajectory, mount).level_m, boat_m, laser.here)
     level_m = water_level_m(planes)
     place = found_place(reaching_water(planes, level_m), level_m, context.frame, depth_m)
     track = trajectory.positions_m[:: max(1, len(trajectory.positions_m) // TRACK), :2]
     boat = float(boat_m[0]), float(boat_m[1])
     return replace(place, read=points.read, used=len(points), boat_m=boat, track_m=track)
+
+
+def _load(trajectory: Trajectory) -> None:
+    """Load, while workers unpack points, what is used afterwards: two libraries and machine code, a second's work."""
+    import scipy.linalg
+    import scipy.spatial  # noqa: F401
+
+    trajectory.poses_at(trajectory.t_ns[:1])
 
 
 def _pose_noise(session: SessionConfig, sigmas: list[Batch], t_ns: np.ndarray) -> PoseNoise:
