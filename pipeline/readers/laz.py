@@ -149,5 +149,7 @@ def decompressed_points(path: Path, name: str, start: int, stop: int, batch: int
 
 
 def _places(points: NDArray[Any], scales: Sequence[float], offsets: Sequence[float], rows: Rows) -> tuple[Array, ...]:
+    if not isinstance(rows, slice):  # whole points are gathered, as bytes: field by field takes three times as long
+        points, rows = np.take(points.view(f"V{points.itemsize}"), rows).view(points.dtype), slice(None)
     axes = zip("xyz", scales, offsets, strict=True)
     return tuple(points[axis][rows] * scale + offset for axis, scale, offset in axes)

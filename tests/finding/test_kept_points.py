@@ -107,3 +107,15 @@ def test_the_sample_is_the_same_if_fewer_points_leave_the_reader(
     assert fewer.read == whole.read
     np.testing.assert_array_equal(fewer.t_ns, whole.t_ns)
     np.testing.assert_array_equal(fewer.level_m, whole.level_m)
+
+
+def test_of_a_part_that_tells_no_number_a_bounded_sample_leaves_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pipeline.finding.kept_points.DRAWN", 1000)
+    t_ns = np.arange(400_000) * 8333
+    columns = {"t_ns": t_ns} | {f"{axis}_m": np.arange(len(t_ns), dtype=float) for axis in "xyz"}
+    read, drawn = drawn_points(MemoryPart("0", columns), ALL)
+    assert read == len(t_ns)
+    assert 400 < len(drawn["t_ns"]) <= 1000
+    np.testing.assert_array_equal(drawn["drawn"], scattered(drawn["t_ns"]))
+    np.testing.assert_array_equal(drawn["x_m"], drawn["t_ns"] // 8333)
+    assert drawn["drawn"].max() <= np.sort(scattered(t_ns))[len(drawn["t_ns"]) - 1]  # the smallest of all
