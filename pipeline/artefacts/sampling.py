@@ -9,7 +9,7 @@ from pipeline.artefacts.streams import Batch, point_array
 
 _Array = NDArray[np.float64]
 KEY_BITS = 20
-
+ALL = 2**64 - 1  # the largest number that a row draws
 
 Voxels = tuple[NDArray[np.int64], _Array]  # keys (v,); for each voxel the count and the sums of x, y, z (v, 4)
 
@@ -75,3 +75,14 @@ def sample_rows(batch: Batch, one_in: float) -> Batch:
     mixed = (mixed ^ (mixed >> np.uint64(29))) * np.uint64(0xBF58476D1CE4E5B9)
     chosen = np.flatnonzero((mixed >> np.uint64(40)) < np.uint64((1 << 24) / one_in))
     return {name: values[chosen] for name, values in batch.items()}
+
+
+def scattered(t_ns: NDArray[np.int64]) -> NDArray[np.uint64]:
+    """Return numbers (n,) of 64 bits, as if drawn at random, that depend on the times (n,) alone.
+
+    Steele et al. 2014, "Fast splittable pseudorandom number generators": the finalizer of SplitMix64.
+    """
+    x = t_ns.astype(np.uint64) + np.uint64(0x9E3779B97F4A7C15)
+    for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB)):
+        x = (x ^ (x >> np.uint64(shift))) * np.uint64(factor)
+    return np.asarray(x ^ (x >> np.uint64(31)))

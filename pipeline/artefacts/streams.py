@@ -45,12 +45,16 @@ def point_array(batch: Batch, suffix: str, rows: Any = slice(None)) -> np.ndarra
 
 @dataclass(frozen=True)
 class Chunk:
-    """A batch of a part's rows, the counts of rows left out, and, from an INS, its stated sigmas and filter states."""
+    """A batch of a part's rows, the counts of rows left out, and, from an INS, its stated sigmas and filter states.
+
+    undrawn: number of usable rows that are left out because a sample alone is wanted.
+    """
 
     columns: Batch  # usable rows
     dropped: Mapping[str, int] = field(default_factory=dict)  # rows left out, by reason
     sigmas: Batch = field(default_factory=dict)  # columns of the table ins_sigmas, with their own times
     states: Batch = field(default_factory=dict)  # of the INS's filter, by usable row (readers/novatel.py: STATES)
+    undrawn: int = 0
 
 
 class Part(Protocol):

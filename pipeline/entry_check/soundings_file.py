@@ -115,8 +115,8 @@ def _las(path: Path) -> Batches:
             batches = decompressed_points(path, str(path), 0, header.present, BATCH_ROWS)
         else:
             batches = las_points(file, str(path), 0, header.present)
-        for _, x, y, z in batches:
-            yield np.stack([x, y, z], axis=1), 0
+        for points in batches:
+            yield np.stack(points.places(slice(None)), axis=1), 0
 
 
 def file_side(path: Path, crs: str | None, side: RunSide) -> FileSide:

@@ -2,15 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.artefacts.streams import Mapper, serial
 from pipeline.errors import RawDataError
 from pipeline.maths.surfaces.flatness import Flatness, cells_of, flatness, plane_axes
 from pipeline.maths.surfaces.growing import GrowthLimits, Plane, grown_regions, plane_of_voxels
 from pipeline.maths.surfaces.outline import area, convex_hull, inside, shrunk, simplified
-from pipeline.maths.surfaces.voxels import voxels_of
+from pipeline.maths.surfaces.voxels import voxels_with_rows
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -25,7 +27,7 @@ BEYOND_M = VOXEL_M + MARGIN_M  # so far outside the first outline the last one m
 LEAST_M, UNEVEN_M, BOW_M, COVERED = 1.0, 0.03, 0.03, 0.6  # extent; RMS; height of a bow; share of the cells seen
 LEVEL_DEG = 10.0  # a plane that is less inclined is a deck, a quay's top or the water
 NEAR_WATER_M = 0.5  # largest height of a plane's lower end above the water
-COLUMN_SPREAD_M, FEWEST_COLUMNS = 0.1, 6  # columns of points that end at the water
+COLUMN_SPREAD_M, FEWEST_COLUMNS, FULL = 0.1, 6, 20  # columns of points that end at the water; points of a column
 
 
 @dataclass(frozen=True)
@@ -68,21 +70,29 @@ class DryPlane:
         return np.asarray(outline_m @ plane_axes(self.normal) + self.distance_m * self.normal)
 
 
-def dry_planes(points_m: Array, boat_m: Array) -> list[DryPlane]:
-    """Return the planes among points (n, 3), the largest first; boat_m (3,): where the boat was in the mean."""
-    voxels = voxels_of(points_m, VOXEL_M)
+def dry_planes(points_m: Array, boat_m: Array, mapper: Mapper = serial) -> list[DryPlane]:
+    """Return the planes among points (n, 3), the largest first.
+
+    Parameters
+    ----------
+    points_m : (n, 3) array
+        The points, z up.
+    boat_m : (3,) array
+        Where the boat was in the mean.
+    mapper : Mapper, optional
+        Spreads the planes on the memory of this process.
+    """
+    voxels, row = voxels_with_rows(points_m, VOXEL_M)
     regions = grown_regions(voxels, GROWTH)
-    row = np.searchsorted(voxels.code, voxels.code_of(points_m))
     number = np.full(len(voxels), -1)
     for k, rows in enumerate(regions):
         number[rows] = k
     of_point = number[row]
     order = np.argsort(of_point, kind="stable")
     ends = np.searchsorted(of_point[order], np.arange(len(regions) + 1))
-    found = [
-        _plane(points_m, order[ends[k] : ends[k + 1]], plane_of_voxels(voxels, rows), boat_m)
-        for k, rows in enumerate(regions)
-    ]
+    of_regions = (order[ends[k] : ends[k + 1]] for k in range(len(regions)))
+    grown = (plane_of_voxels(voxels, rows) for rows in regions)
+    found = mapper(partial(_plane, points_m, boat_m=boat_m), of_regions, grown)
     return sorted(found, key=lambda plane: -plane.flat.width_m * plane.flat.height_m)
 
 
@@ -133,14 +143,13 @@ def _near_the_edge(points_m: Array, normal: Array, distance_m: float, coarse: Ar
     Means of the outermost coarse cells lie up to half a cell inside the edge, and voxels at a corner belong to neither
     wall: together a fifth of a narrow wall's points.
     """
-    near = points_m[np.abs(points_m @ normal - distance_m) <= OFF_M]
-    if len(coarse):
-        in_plane, low, high = near @ plane_axes(normal).T, coarse.min(axis=0), coarse.max(axis=0)
-        near = near[np.all((in_plane > low - BEYOND_M) & (in_plane < high + BEYOND_M), axis=1)]
-    cells_m, fine = _cells_on(near, normal, distance_m, EDGE_CELL_M, EDGE_MARGIN_M)
-    if len(coarse) < 3 or len(cells_m) * EDGE_CELL_M**2 < COVERED * area(coarse):
+    if len(coarse) < 3:
         return coarse
-    return fine
+    near = points_m[np.abs(points_m @ normal - distance_m) <= OFF_M]
+    in_plane, low, high = near @ plane_axes(normal).T, coarse.min(axis=0), coarse.max(axis=0)
+    near = near[np.all((in_plane > low - BEYOND_M) & (in_plane < high + BEYOND_M), axis=1)]
+    cells_m, fine = _cells_on(near, normal, distance_m, EDGE_CELL_M, EDGE_MARGIN_M)
+    return fine if len(cells_m) * EDGE_CELL_M**2 >= COVERED * area(coarse) else coarse
 
 
 def _cells_on(
@@ -162,11 +171,10 @@ def _cells_on(
 def _column_ends(along_m: Array, heights_m: Array) -> Array:
     """Return the height (c,) of the lowest points of each column of a cell's width that has points enough."""
     column = np.floor(along_m / CELL_M).astype(np.int64)
-    order = np.lexsort((heights_m, column))
-    starts = np.flatnonzero(np.diff(column[order], prepend=column.min(initial=0) - 1))
-    counts = np.diff(starts, append=len(order))
-    use = counts >= 20
-    return np.asarray(heights_m[order][starts[use] + counts[use] // 50])
+    counts = np.bincount(column - column.min(initial=0))
+    order = np.argsort(column, kind="stable")
+    columns = np.split(heights_m[order], np.cumsum(counts)[:-1])
+    return np.array([np.partition(one, len(one) // 50)[len(one) // 50] for one in columns if len(one) >= FULL])
 
 
 def _refusal(plane: DryPlane) -> str:

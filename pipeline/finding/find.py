@@ -13,11 +13,11 @@ from pipeline.config.stage_settings import InsErrors, LaserPlacement, LaserPoint
 from pipeline.finding.dry_planes import dry_planes, reaching_water, water_level_m
 from pipeline.finding.kept_points import kept_points, level_context
 from pipeline.finding.place import FoundPlace, found_place
+from pipeline.finding.reading import read_files
 from pipeline.finding.without_drift import track_without_drift
 from pipeline.maths.adjustment.pose_errors import PoseNoise
+from pipeline.maths.geometry.trajectory import Trajectory
 from pipeline.mount import mount_of
-from pipeline.readers.file_summaries import thin_sigmas
-from pipeline.readers.track_tables import trajectory_table
 
 TRACK = 2000  # places of the boat that are kept for pictures
 PROVISIONAL = 250_000  # points of the planes that the drift is taken from
@@ -35,15 +35,16 @@ def find_place(ins: Stream, laser: Stream, session: SessionConfig, depth_m: floa
     depth_m : float
         Depth below the water to which faces are continued.
     """
-    records, sigmas = _read(ins)
+    records, sigmas, drawn = read_files(ins, laser)
     context, mount = level_context(records), mount_of(session.laser.mount)
-    points = kept_points(laser, context, narrow(LaserPlacement, session.laser))
+    _load(context.trajectory)
+    points = kept_points(drawn, context, narrow(LaserPlacement, session.laser))
     boat_m = context.trajectory.positions_m.mean(axis=0)
     some = points.level_m[:: max(1, len(points) // PROVISIONAL)]
-    serving = [plane for plane in dry_planes(some, boat_m) if not plane.refused]
+    serving = [plane for plane in dry_planes(some, boat_m, laser.here) if not plane.refused]
     noise = _pose_noise(session, sigmas, records["t_ns"].to_numpy())
-    trajectory = track_without_drift(points, serving, mount, narrow(LaserPoints, session.laser), noise)
-    planes = dry_planes(points.along(trajectory, mount).level_m, boat_m)
+    trajectory = track_without_drift(points, serving, mount, narrow(LaserPoints, session.laser), noise, laser.here)
+    planes = dry_planes(points.along(trajectory, mount).level_m, boat_m, laser.here)
     level_m = water_level_m(planes)
     place = found_place(reaching_water(planes, level_m), level_m, context.frame, depth_m)
     track = trajectory.positions_m[:: max(1, len(trajectory.positions_m) // TRACK), :2]
@@ -51,15 +52,12 @@ def find_place(ins: Stream, laser: Stream, session: SessionConfig, depth_m: floa
     return replace(place, read=points.read, used=len(points), boat_m=boat, track_m=track)
 
 
-def _read(ins: Stream) -> tuple[pd.DataFrame, list[Batch]]:
-    """Return the INS's records in order of time, and the sigmas that its files state, file by file."""
-    records: list[Batch] = []
-    sigmas: list[Batch] = []
-    for part in ins.parts:
-        for chunk in part.chunks():
-            records += [chunk.columns] if chunk.columns else []
-            sigmas += [thin_sigmas(chunk.sigmas)] if chunk.sigmas else []
-    return trajectory_table(records)[0], sigmas
+def _load(trajectory: Trajectory) -> None:
+    """Load, while workers unpack points, what is used afterwards: two libraries and machine code, a second's work."""
+    import scipy.linalg
+    import scipy.spatial  # noqa: F401
+
+    trajectory.poses_at(trajectory.t_ns[:1])
 
 
 def _pose_noise(session: SessionConfig, sigmas: list[Batch], t_ns: np.ndarray) -> PoseNoise:

@@ -3,10 +3,10 @@
 A point is kept if the number that its time is scattered to lies below a limit, which falls by half whenever too many
 are kept. So the sample does not depend on how the files are divided or how many workers read them, all stretches of the
 session have their share, and the memory is the same for any session. Where the files say how many points they have, the
-limit begins so low that not many more than are kept are placed.
+limit begins so low that not many more than are kept leave the reader. Points are placed when the sample is complete.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,24 +14,25 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline.artefacts.streams import Batch, Part, Stream, point_array
+from pipeline.artefacts.sampling import ALL, scattered
+from pipeline.artefacts.streams import Part, point_array
 from pipeline.config.stage_settings import LaserPlacement
 from pipeline.errors import RawDataError
 from pipeline.georeference.placement import laser_in_pool
 from pipeline.georeference.pool_context import PoolContext
 from pipeline.maths.geometry.trajectory import Trajectory
 from pipeline.mount import Mounted
+from pipeline.readers.crs import LASER_FRAME
 from pipeline.readers.las import LasPart
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Columns = Mapping[str, NDArray[Any]]
 MOST = 750_000  # points of the sample
-PLACED = 4 * MOST  # points that are placed, near the boat or not, if the files say how many there are
+DRAWN = 4 * MOST  # points that leave the reader, near the boat or not, if the files say how many there are
 FARTHEST_M = 50.0  # of a point from the INS
 MAX_INTERVAL_NS = 100_000_000  # between two INS records, for a point between them to be placed
 EVERYWHERE = (np.full(3, -np.inf), np.full(3, np.inf))
-ALL = 2**64 - 1
 
 
 @dataclass(frozen=True)
@@ -73,16 +74,40 @@ def level_context(ins: pd.DataFrame) -> PoolContext:
     return PoolContext.of(ins, one_pass, pd.DataFrame(place), EVERYWHERE)
 
 
-def kept_points(stream: Stream, context: PoolContext, laser: LaserPlacement) -> KeptPoints:
-    """Return the sample of a session's laser points; an error if the INS covers none of them."""
-    limit = first_limit(stream.parts)
-    read, sample = sampled(stream.fold(_placed, context, laser, limit), MOST)
+def kept_points(drawn: Iterable[tuple[int, Columns]], context: PoolContext, laser: LaserPlacement) -> KeptPoints:
+    """Return the sample of a session's laser points; an error if the INS covers none of them.
+
+    Parameters
+    ----------
+    drawn
+        The :func:`drawn_points` of each part of the laser's files, in order.
+    context
+        The trajectory.
+    laser
+        The laser's mount and frame.
+    """
+    read, sample = sampled(((count, _near(columns, context, laser)) for count, columns in drawn if columns), MOST)
     if not sample or not len(sample["t_ns"]):
         raise RawDataError(
             f"laser: none of {read:,} points lies within {FARTHEST_M:g} m of the boat while the INS recorded; "
             "check laser.mount, laser.frame and the clocks: poolcal check looks into them"
         )
-    return KeptPoints(sample["t_ns"], sample["own_m"], sample["level_m"], read, context)
+    own, level = laser_in_pool(sample["t_ns"], point_array(sample, "m"), context, laser)
+    return KeptPoints(sample["t_ns"], own, level, read, context)
+
+
+def drawn_points(part: Part, limit: int) -> tuple[int, Columns]:
+    """Return the number of a part's points, and columns of those that drew a number up to a limit, at most ``DRAWN``.
+
+    The columns are those of the reader, and ``drawn``.
+    """
+    return sampled(_drawn(replace(part, limit=limit) if isinstance(part, LasPart) else part, limit), DRAWN)
+
+
+def _drawn(part: Part, limit: int) -> Iterator[tuple[int, Columns]]:
+    for chunk in part.chunks():
+        drawn = scattered(np.asarray(chunk.columns["t_ns"], dtype=np.int64))
+        yield len(drawn) + chunk.undrawn, _below(dict(chunk.columns) | {"drawn": drawn}, limit)
 
 
 def sampled(batches: Iterable[tuple[int, Columns]], most: int) -> tuple[int, dict[str, NDArray[Any]]]:
@@ -114,29 +139,20 @@ def sampled(batches: Iterable[tuple[int, Columns]], most: int) -> tuple[int, dic
 
 
 def first_limit(parts: Sequence[Part]) -> int:
-    """Return the limit by which at most ``PLACED`` points are placed, as far as LAS files say how many they have."""
+    """Return the limit by which at most ``DRAWN`` points leave the reader, if LAS files say how many they have."""
     claimed, limit = sum(part.stop - part.start for part in parts if isinstance(part, LasPart)), ALL
-    while claimed > PLACED:
+    while claimed > DRAWN:
         claimed, limit = claimed // 2, limit // 2
     return limit
 
 
-def _placed(
-    batch: Batch, context: PoolContext, laser: LaserPlacement, limit: int
-) -> tuple[int, dict[str, NDArray[np.generic]]]:
-    """Return the number of a batch's points, and those near the boat, placed, with the number each has drawn."""
-    t_ns = np.asarray(batch["t_ns"], dtype=np.int64)
-    drawn = scattered(t_ns)
-    rows = np.flatnonzero((drawn <= np.uint64(limit)) & context.trajectory.covers(t_ns, MAX_INTERVAL_NS))
-    times, points = t_ns[rows], point_array(batch, "m", rows)
-    own, level = laser_in_pool(times, points, context, laser)
-    near = np.flatnonzero(np.einsum("ni,ni->n", own, own) <= FARTHEST_M**2)
-    return len(t_ns), {
-        "t_ns": times[near],
-        "own_m": own[near],
-        "level_m": level[near],
-        "drawn": drawn[rows[near]],
-    }
+def _near(columns: Columns, context: PoolContext, laser: LaserPlacement) -> Columns:
+    """Return the columns of points near the boat, at times that the INS covers."""
+    t_ns, points = columns["t_ns"], point_array(columns, "m")
+    rows = np.flatnonzero(context.trajectory.covers(t_ns, MAX_INTERVAL_NS))
+    own = points[rows] if laser.frame == LASER_FRAME else laser_in_pool(t_ns[rows], points[rows], context, laser)[0]
+    near = rows[np.einsum("ni,ni->n", own, own) <= FARTHEST_M**2]
+    return {name: column[near] for name, column in columns.items()}
 
 
 def _below(piece: Columns, limit: int) -> Columns:
@@ -144,14 +160,3 @@ def _below(piece: Columns, limit: int) -> Columns:
         return piece
     rows = np.flatnonzero(piece["drawn"] <= np.uint64(limit))
     return {name: column[rows] for name, column in piece.items()}
-
-
-def scattered(t_ns: Integers) -> NDArray[np.uint64]:
-    """Return numbers (n,) of 64 bits, as if drawn at random, that depend on the times (n,) alone.
-
-    Steele et al. 2014, "Fast splittable pseudorandom number generators": the finalizer of SplitMix64.
-    """
-    x = t_ns.astype(np.uint64) + np.uint64(0x9E3779B97F4A7C15)
-    for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB)):
-        x = (x ^ (x >> np.uint64(shift))) * np.uint64(factor)
-    return np.asarray(x ^ (x >> np.uint64(31)))

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.artefacts.sampling import scattered
 from pipeline.artefacts.streams import Batch, Stream
 from pipeline.config.stage_settings import SonarPlacement
-from pipeline.finding.kept_points import MAX_INTERVAL_NS, Columns, sampled, scattered
+from pipeline.finding.kept_points import MAX_INTERVAL_NS, Columns, sampled
 from pipeline.georeference.placement import soundings_in_pool
 from pipeline.georeference.pool_context import PoolContext
 from pipeline.maths.geometry.passes import pass_of

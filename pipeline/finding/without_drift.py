@@ -6,6 +6,7 @@ Planes and drift are unknown, as in a calibration; no mount is.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from pipeline.adjustment.observation_model import ObservationModel
 from pipeline.adjustment.problem import CalibrationProblem, PointNoise, PriorInformation, sensor_sigmas
 from pipeline.adjustment.weighted_iteration import weighted_iteration
-from pipeline.artefacts.streams import Batch, MemoryPart, Stream
+from pipeline.artefacts.streams import Batch, Mapper, MemoryPart, Stream, serial
 from pipeline.config.pool import Adjust, Ingest
 from pipeline.finding.dry_planes import DryPlane
 from pipeline.finding.kept_points import KeptPoints
@@ -35,7 +36,12 @@ GATE_M = 0.1  # of a point from its plane: the drift, and the plane's own error
 
 
 def track_without_drift(
-    points: KeptPoints, planes: Sequence[DryPlane], mount: Mounted, sigmas: PointNoise, noise: PoseNoise
+    points: KeptPoints,
+    planes: Sequence[DryPlane],
+    mount: Mounted,
+    sigmas: PointNoise,
+    noise: PoseNoise,
+    mapper: Mapper = serial,
 ) -> Trajectory:
     """Return the trajectory, corrected by the drift; as it is if the points do not show it.
 
@@ -51,12 +57,14 @@ def track_without_drift(
         Its noise.
     noise : PoseNoise
         The errors of the INS.
+    mapper : Mapper, optional
+        Spreads the work on the memory of this process.
     """
     trajectory = points.context.trajectory
     batch = _points_on(planes, points)
     if not len(batch["t_ns"]):
         return trajectory
-    problem = _problem(planes, trajectory, mount, sigmas, noise)
+    problem = replace(_problem(planes, trajectory, mount, sigmas, noise), mapper=mapper)
     stream = Stream((MemoryPart("laser", batch),))
     adjusted = weighted_iteration(problem, {"laser": stream}, Adjust(max_iterations=READINGS), Ingest().max_gap_s)
     return trajectory if adjusted.deficient else adjusted.last.drift.corrected(trajectory)

@@ -11,23 +11,24 @@ import logging
 import struct
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.artefacts.sampling import ALL, scattered
 from pipeline.artefacts.streams import BATCH_ROWS, Chunk
 from pipeline.config.recording import LasTime
 from pipeline.errors import RawDataError
 from pipeline.gps_time import ADJUSTED_STANDARD_OFFSET_S, NS, WEEK_S, gps_ns_from_week_seconds
-from pipeline.readers.crs import LaserFrame, frame_transform, transform_to_ecef
+from pipeline.readers.crs import COORDINATES, LaserFrame, frame_transform, transform_to_ecef
 from pipeline.readers.declared_crs import refuse_other_crs
-from pipeline.readers.decoder_process import DecodedColumns
 from pipeline.readers.las_header import LasHeader
 from pipeline.readers.las_times import refuse_unusable_times
-from pipeline.readers.laz import decompressed_points
+from pipeline.readers.laz import Array, DecodedPoints, Rows, decompressed_points
 from pipeline.readers.raw_file import opened
 from pipeline.readers.row_checks import latency_ns, possible_ns
 from pipeline.readers.row_filter import LASER_COLUMNS, RowFilter, chunk, no_rows
@@ -54,6 +55,7 @@ class LasPart:
     gps_week: int | None  # None: adjusted standard time
     declared_time: LasTime
     first_s: float
+    limit: int = ALL  # points whose times draw a larger number are left out, before their frame is left
 
     def chunks(self) -> Iterator[Chunk]:
         """Yield the points in canonical columns, batch by batch."""
@@ -62,13 +64,13 @@ class LasPart:
         with opened(self.path, self.name) as file:
             for points in self._points(file):
                 first = done == self.start
-                done += len(points[0])
+                done += len(points.times_s)
                 yield self._chunk(points, dropped, first)
         dropped["truncated"] += self.stop - done
         if dropped["truncated"]:
             yield no_rows(LASER_COLUMNS, dropped)
 
-    def _points(self, file: BinaryIO) -> Iterator[DecodedColumns]:
+    def _points(self, file: BinaryIO) -> Iterator[DecodedPoints]:
         if self.stop <= self.start:
             return iter(())
         if self.compressed:
@@ -76,18 +78,26 @@ class LasPart:
         return las_points(file, self.name, self.start, self.stop)
 
     @np.errstate(all="ignore")  # damaged numbers are counted, without numpy's warnings
-    def _chunk(self, points: DecodedColumns, dropped: Counter[str], first: bool) -> Chunk:
-        seconds, x_m, y_m, z_m = points
+    def _chunk(self, points: DecodedPoints, dropped: Counter[str], first: bool) -> Chunk:
         if first:
-            refuse_unusable_times(seconds, self.name, self.gps_week is None, self.declared_time)
-        rows = RowFilter({"seconds": seconds, "x_m": x_m, "y_m": y_m, "z_m": z_m}, dropped)
+            refuse_unusable_times(points.times_s, self.name, self.gps_week is None, self.declared_time)
+        every = len(points.times_s)
+        rows = RowFilter({"seconds": points.times_s, "row": np.arange(every)}, dropped)
         rows.keep_finite()
         rows.keep(rows["seconds"] != 0, "no time")
         rows.columns["t_ns"] = self._gps_ns(rows) - latency_ns(self.latency_s)
+        usable = len(rows)
+        if self.limit < ALL:
+            drawn = np.flatnonzero(scattered(rows["t_ns"]) <= np.uint64(self.limit))
+            rows.columns = {name: values[drawn] for name, values in rows.columns.items()}
+        undrawn = usable - len(rows)
+        places = points.places(rows["row"] if len(rows) < every else slice(None))
+        rows.columns |= dict(zip(COORDINATES, places, strict=True))
+        rows.keep_finite()
         if first:
             refuse_other_crs(self.frame, self.crs, (rows["x_m"], rows["y_m"], rows["z_m"]), self.name)
         transform_to_ecef(rows, self.frame, self.name)
-        return chunk(rows.columns, LASER_COLUMNS, dropped)
+        return replace(chunk(rows.columns, LASER_COLUMNS, dropped), undrawn=undrawn)
 
     def _gps_ns(self, rows: RowFilter) -> NDArray[np.int64]:
         if self.gps_week is None:
@@ -183,8 +193,8 @@ def crs_of_las(path: Path, name: str) -> str:
     return "" if crs is None else str(crs.to_wkt())
 
 
-def las_points(file: BinaryIO, name: str, start: int, stop: int) -> Iterator[DecodedColumns]:
-    """Yield GPS time (0 without one), x, y, z of points ``start`` to ``stop``, batch by batch."""
+def las_points(file: BinaryIO, name: str, start: int, stop: int) -> Iterator[DecodedPoints]:
+    """Yield points ``start`` to ``stop``, batch by batch."""
     import laspy
 
     try:
@@ -196,8 +206,12 @@ def las_points(file: BinaryIO, name: str, start: int, stop: int) -> Iterator[Dec
             if not len(points):
                 return
             timed = "gps_time" in points.point_format.dimension_names
-            times = points.gps_time if timed else np.zeros(len(points))
-            yield tuple(np.asarray(values, np.float64) for values in (times, points.x, points.y, points.z))
+            times_s = np.asarray(points.gps_time if timed else np.zeros(len(points)), np.float64)
+            yield DecodedPoints(times_s, partial(_places, points))
             start += len(points)
     except (laspy.LaspyException, ValueError, LookupError, OverflowError, struct.error) as error:
         raise RawDataError(f"{name}: is damaged ({error}); copy or export it again") from error
+
+
+def _places(points: Any, rows: Rows) -> tuple[Array, ...]:
+    return tuple(np.asarray(axis, np.float64)[rows] for axis in (points.x, points.y, points.z))

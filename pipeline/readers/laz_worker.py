@@ -36,9 +36,10 @@ def _main(path: str, start: int, stop: int, batch: int, size: int, points: int, 
         decompressor = lazrs.LasZipDecompressor(file, laszip, lazrs.DecompressionSelection(wanted))
         if start:
             decompressor.seek(start)
+        memory = memoryview(bytearray(min(batch, stop - start) * size))  # taken once: new memory takes time to clear
         while start < stop:
             count = min(batch, stop - start)
-            unpacked = bytearray(count * size)
+            unpacked = memory[: count * size]
             decompressor.decompress_many(unpacked)
             out.write(struct.pack("=q", count))
             out.write(unpacked)

@@ -8,7 +8,9 @@ import pytest
 from pipeline.errors import RawDataError
 from pipeline.finding.dry_planes import (
     BOW_M,
+    CELL_M,
     COVERED,
+    FULL,
     NEAR_WATER_M,
     UNEVEN_M,
     DryPlane,
@@ -16,6 +18,7 @@ from pipeline.finding.dry_planes import (
     reaching_water,
     water_level_m,
 )
+from pipeline.maths.surfaces.flatness import plane_axes
 
 Array = np.ndarray
 FAR, BOAT = np.array([300.0, -700.0, 9.0]), np.array([294.0, -700.0, 9.5])  # the boat lies to the west
@@ -32,6 +35,17 @@ def wall(width_m: float, height_m: float, shape: Callable[[Array, Array], Array]
 
 def largest(points: Array) -> DryPlane:
     return dry_planes(points, BOAT)[0]
+
+
+def test_a_column_ends_where_its_lowest_fiftieth_does() -> None:
+    """Of columns a cell wide, those with 20 points or more; the last ones of a wall have fewer, or more."""
+    points = wall(4.1, 2.0)[:600]
+    plane = largest(points)
+    along = np.floor(points @ plane_axes(plane.normal)[0] / CELL_M)
+    columns = [np.sort(points[along == k, 2]) for k in np.unique(along)]
+    expected = [heights[len(heights) // 50] for heights in columns if len(heights) >= FULL]
+    assert len(columns) > len(expected) > 10
+    np.testing.assert_array_equal(plane.column_ends_m, expected)
 
 
 def test_a_plain_wall_serves_and_looks_to_the_boat() -> None:

@@ -5,21 +5,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.artefacts.streams import MemoryPart, Stream
+from pipeline.artefacts.sampling import ALL, scattered
+from pipeline.artefacts.streams import MemoryPart
 from pipeline.config.session import SessionConfig
 from pipeline.config.stage_settings import LaserPlacement
 from pipeline.config.yaml_models import parse
 from pipeline.errors import RawDataError
 from pipeline.finding.kept_points import (
-    ALL,
+    DRAWN,
     FARTHEST_M,
     MOST,
-    PLACED,
     KeptPoints,
+    drawn_points,
     first_limit,
     kept_points,
     level_context,
-    scattered,
 )
 from pipeline.mount import mount_of
 from pipeline.readers.las import LasPart
@@ -35,7 +35,7 @@ def session() -> SimulatedSession:
     return made(TRACK)
 
 
-def kept(session: SimulatedSession, parts: int, shift_ns: int = 0) -> KeptPoints:
+def kept(session: SimulatedSession, parts: int, shift_ns: int = 0, limit: int = ALL) -> KeptPoints:
     laser = parse(SessionConfig, session.session, "session").laser
     columns = dict(session.laser) | {"t_ns": session.laser["t_ns"] + shift_ns}
     ends = np.linspace(0, len(columns["t_ns"]), parts + 1).astype(int)
@@ -44,7 +44,8 @@ def kept(session: SimulatedSession, parts: int, shift_ns: int = 0) -> KeptPoints
         for k in range(parts)
     ]
     context = level_context(trajectory_table([session.ins])[0])
-    return kept_points(Stream(tuple(pieces)), context, LaserPlacement(mount=laser.mount, frame=laser.frame))
+    drawn = [drawn_points(piece, limit) for piece in pieces]
+    return kept_points(drawn, context, LaserPlacement(mount=laser.mount, frame=laser.frame))
 
 
 @pytest.mark.parametrize("most", [10**9, 5000])
@@ -88,22 +89,33 @@ def stretch(start: int, stop: int) -> LasPart:
     return LasPart(Path("a.laz"), "a.laz", True, start, stop, 0, "laser", "", 0.0, None, None, 0.0)
 
 
-def test_of_large_files_few_points_are_placed() -> None:
-    """By halves, so that never fewer than half of what may be placed are; of other files nobody knows the number."""
-    assert first_limit([stretch(0, PLACED)]) == ALL
-    assert first_limit([stretch(0, PLACED), stretch(PLACED, PLACED + 2)]) == ALL // 2
-    assert first_limit([stretch(0, 4_000_000), stretch(4_000_000, 8 * PLACED)]) == ALL // 8
-    assert first_limit([MemoryPart("0", {"t_ns": np.zeros(10 * PLACED, dtype=np.int8)})]) == ALL
-    assert PLACED >= 4 * MOST
+def test_of_large_files_few_points_leave_the_reader() -> None:
+    """By halves, so that never fewer than half of what may leave it do; of other files nobody knows the number."""
+    assert first_limit([stretch(0, DRAWN)]) == ALL
+    assert first_limit([stretch(0, DRAWN), stretch(DRAWN, DRAWN + 2)]) == ALL // 2
+    assert first_limit([stretch(0, 4_000_000), stretch(4_000_000, 8 * DRAWN)]) == ALL // 8
+    assert first_limit([MemoryPart("0", {"t_ns": np.zeros(10 * DRAWN, dtype=np.int8)})]) == ALL
+    assert DRAWN >= 4 * MOST
 
 
-def test_the_sample_is_the_same_if_fewer_points_are_placed(
+def test_the_sample_is_the_same_if_fewer_points_leave_the_reader(
     session: SimulatedSession, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("pipeline.finding.kept_points.MOST", 2000)
     whole = kept(session, 2)
-    monkeypatch.setattr("pipeline.finding.kept_points.first_limit", lambda _: ALL // 4)
-    fewer = kept(session, 2)
+    fewer = kept(session, 2, limit=ALL // 4)
     assert fewer.read == whole.read
     np.testing.assert_array_equal(fewer.t_ns, whole.t_ns)
     np.testing.assert_array_equal(fewer.level_m, whole.level_m)
+
+
+def test_of_a_part_that_tells_no_number_a_bounded_sample_leaves_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pipeline.finding.kept_points.DRAWN", 1000)
+    t_ns = np.arange(400_000) * 8333
+    columns = {"t_ns": t_ns} | {f"{axis}_m": np.arange(len(t_ns), dtype=float) for axis in "xyz"}
+    read, drawn = drawn_points(MemoryPart("0", columns), ALL)
+    assert read == len(t_ns)
+    assert 400 < len(drawn["t_ns"]) <= 1000
+    np.testing.assert_array_equal(drawn["drawn"], scattered(drawn["t_ns"]))
+    np.testing.assert_array_equal(drawn["x_m"], drawn["t_ns"] // 8333)
+    assert drawn["drawn"].max() <= np.sort(scattered(t_ns))[len(drawn["t_ns"]) - 1]  # the smallest of all

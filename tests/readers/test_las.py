@@ -1,11 +1,13 @@
 """LAS and LAZ, byte by byte: points, scales, headers, damage, stretches and frames."""
 
 import struct
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from pipeline.artefacts.sampling import ALL, scattered
 from pipeline.errors import ConfigError, PoolcalError, RawDataError
 from pipeline.readers import las as reader
 from pipeline.readers.dispatch import raw_parts
@@ -98,6 +100,23 @@ def test_stretches_are_the_whole(compress, stretch: int, file: Path, monkeypatch
     for name, values in whole.items():
         assert np.array_equal(np.concatenate([piece.columns[name] for piece in pieces]), values)
     assert not any(piece.dropped for piece in pieces)
+
+
+@pytest.mark.parametrize("compress", [bytes, laz_of])
+@pytest.mark.parametrize("frame", ["laser", "EPSG:4978"])
+def test_a_sample_is_the_rows_that_draw_small_numbers(compress, frame: str, file: Path) -> None:
+    """With one point in seven without a time, which is no usable row, drawn or not."""
+    points = [(x, y, z, 0.0 if k % 7 == 0 else t) for k, (x, y, z, t) in enumerate(las_points(2000))]
+    file.write_bytes(compress(las(points)))
+    (part,) = raw_parts("laser", build.settings("laser", [file.name], "las", frame=frame), file.parent)
+    assert isinstance(part, reader.LasPart)
+    (whole,), (sample,) = part.chunks(), replace(part, limit=ALL // 4).chunks()
+    drawn = scattered(whole.columns["t_ns"]) <= ALL // 4
+    assert 300 < drawn.sum() < 550
+    for name, values in whole.columns.items():
+        np.testing.assert_array_equal(sample.columns[name], values[drawn])
+    assert sample.dropped == whole.dropped == {"no time": 286}
+    assert (whole.undrawn, sample.undrawn) == (0, np.count_nonzero(~drawn))
 
 
 def test_stretches_of_a_cut_file_count_its_loss_once(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:

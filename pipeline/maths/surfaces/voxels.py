@@ -101,6 +101,11 @@ def voxels_of(points_m: Array, size_m: float) -> Voxels:
     >>> voxels_of(np.array([[0.1, 0.1, 0.1], [0.3, 0.1, 0.1], [0.7, 0.1, 0.1]]), 0.5).count
     array([2, 1])
     """
+    return voxels_with_rows(points_m, size_m)[0]
+
+
+def voxels_with_rows(points_m: Array, size_m: float) -> tuple[Voxels, Integers]:
+    """Return the same, and the row (m,) of the voxel in which each point lies."""
     index = np.floor(points_m / size_m).astype(np.int64)
     d = points_m - (index + 0.5) * size_m
     columns = [np.ones(len(d)), *d.T, *(d[:, i] * d[:, j] for i, j in zip(ROWS, COLUMNS, strict=True))]
@@ -111,7 +116,7 @@ def merged_voxels(pieces: Iterable[Voxels]) -> Voxels:
     """Return the voxels of all batches together; there must be one at least."""
     parts = list(pieces)
     columns = [np.column_stack([part.count, part.first, part.second]) for part in parts]
-    return _together(parts[0].size_m, np.concatenate([part.code for part in parts]), np.concatenate(columns).T)
+    return _together(parts[0].size_m, np.concatenate([part.code for part in parts]), np.concatenate(columns).T)[0]
 
 
 def _code(index: Integers) -> Integers:
@@ -120,8 +125,8 @@ def _code(index: Integers) -> Integers:
     return np.asarray((shifted[:, 0] << 42) + (shifted[:, 1] << 21) + shifted[:, 2])
 
 
-def _together(size_m: float, code: Integers, columns: Array) -> Voxels:
-    """Return voxels from rows with these codes (m,); columns (10, m): count, Σ d, Σ d dᵀ."""
+def _together(size_m: float, code: Integers, columns: Array) -> tuple[Voxels, Integers]:
+    """Return voxels from rows with these codes (m,), and the voxel of each; columns (10, m): count, Σ d, Σ d dᵀ."""
     found, inverse = np.unique(code, return_inverse=True)
     sums = np.array([np.bincount(inverse, weights=column, minlength=len(found)) for column in columns])
-    return Voxels(size_m, found, np.rint(sums[0]).astype(np.int64), sums[1:4].T.copy(), sums[4:].T.copy())
+    return Voxels(size_m, found, np.rint(sums[0]).astype(np.int64), sums[1:4].T.copy(), sums[4:].T.copy()), inverse

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from pipeline.maths.surfaces.flatness import cells_of, flatness, plane_axes
 from pipeline.maths.surfaces.growing import GrowthLimits, distances_from, grown_regions, plane_of_voxels
 from pipeline.maths.surfaces.outline import area, clipped, convex_hull, inside, shrunk
-from pipeline.maths.surfaces.voxels import Voxels, merged_voxels, voxels_of
+from pipeline.maths.surfaces.voxels import Voxels, merged_voxels, voxels_of, voxels_with_rows
 
 Array = np.ndarray
 FAR = np.array([812.3, -455.7, 12.4])  # from the origin, as in a harbour
@@ -46,6 +46,12 @@ def test_voxels_of_batches_are_those_of_all_points(seed: int, n: int, batches: i
     own = np.all(np.floor(points / 0.5).astype(int) == whole.index[0], axis=1)
     np.testing.assert_allclose(whole.mean_m[0], points[own].mean(axis=0), atol=1e-9)
     np.testing.assert_allclose(whole.covariance[0], np.cov(points[own].T, ddof=0).reshape(3, 3), atol=1e-9)
+
+
+def test_each_point_has_the_row_of_its_voxel() -> None:
+    points = np.random.default_rng(3).normal(scale=1.5, size=(800, 3)) + FAR
+    voxels, row = voxels_with_rows(points, 0.5)
+    np.testing.assert_array_equal(voxels.index[row], np.floor(points / 0.5))
 
 
 def test_a_plane_of_voxels_is_the_plane_of_their_points() -> None:
@@ -190,8 +196,10 @@ def test_a_square_is_cut_and_made_smaller() -> None:
 
 
 @pytest.mark.parametrize("count", [0, 1, 500])
-def test_cells_are_those_of_rows(count: int) -> None:
+@pytest.mark.parametrize("far_m", [0.0, 9000.0])  # the rectangle round them has few cells, or a thousand million
+def test_cells_are_those_of_rows(count: int, far_m: float) -> None:
     places = np.random.default_rng(count).normal(scale=3.0, size=(count, 2))
+    places[: count // 2] += far_m
     keys, inverse, counts = cells_of(places, 0.25)
     expected = np.unique(np.floor(places / 0.25).astype(np.int64), axis=0, return_inverse=True, return_counts=True)
     np.testing.assert_array_equal(keys, expected[0])
