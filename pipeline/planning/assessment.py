@@ -184,6 +184,7 @@ def assess_plan(plan: Plan, pool: PoolConfig, session: SessionConfig) -> PlanAss
             if family in setting.model.tied_families
         },
         level={family.name for family in setting.model.families if family.level},
+        sloping={family.name for family in setting.model.families if family.sloping},
         speed_m_s=float(speeds),
         heading_swing_deg=float(swings),
     )

@@ -41,8 +41,8 @@ class Coverage:
         Distances of the passes with soundings.
     soundings : Mapping[str, int]
         Number of soundings by family of faces, of those that both sensors see: others tie the sonar to nothing.
-    level : Collection[str]
-        Names of the horizontal families.
+    level, sloping : Collection[str]
+        Names of the horizontal families, and of those that lean so far that they tell a height, too.
     speed_m_s, heading_swing_deg : float
         Speed of a typical pass, and amplitude of its heading.
     """
@@ -50,6 +50,7 @@ class Coverage:
     distances_m: Sequence[float]
     soundings: Mapping[str, int]
     level: Collection[str]
+    sloping: Collection[str]
     speed_m_s: float
     heading_swing_deg: float
 
@@ -132,7 +133,7 @@ def _gaps(coverage: Coverage) -> list[str]:
     missing = [SIDES.get(family, family) for family in upright if family not in there]
     if missing:
         gaps.append(f"the sonar sees nothing of {' and '.join(missing)}")
-    if not there & set(coverage.level):
+    if not there & {*coverage.level, *coverage.sloping}:
         gaps.append(HORIZONTAL)
     low, high = min(coverage.distances_m, default=0.0), max(coverage.distances_m, default=0.0)
     if len(coverage.distances_m) == 1:

@@ -56,6 +56,7 @@ def geometry_table(
         distances_m=[float(distance) for distance in passes["distance_m"] if np.isfinite(distance)],
         soundings={family: count for family, count in soundings.items() if family in tied},
         level={family.name for family in setting.model.families if family.level},
+        sloping={family.name for family in setting.model.families if family.sloping},
         speed_m_s=_measured(passes["speed_m_s"].abs().median(), usual.speed_m_s),
         # the amplitude of a wave is √2 times its standard deviation
         heading_swing_deg=_measured(passes["heading_swing_deg"].median() * np.sqrt(2), usual.heading_swing_deg),

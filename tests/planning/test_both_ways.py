@@ -38,7 +38,12 @@ def sigmas(mount: dict[str, float], field_deg: tuple[float, float], *passes: dic
 
 def gaps(*names: str) -> list[str]:
     """Gaps in the geometry of two passes, if of the dock these walls alone are there."""
-    target = DOCK["target"] | {"faces": {name: DOCK["target"]["faces"][name] for name in names}}
+    return gaps_of({name: DOCK["target"]["faces"][name] for name in names})
+
+
+def gaps_of(faces: dict[str, Any]) -> list[str]:
+    """The same of any faces."""
+    target = DOCK["target"] | {"faces": faces}
     session = made(DOCK | {"target": target}, {"track": {"distances_m": [4.0]}}, seed=2)
     plan = parse(Plan, {"laser": FIELD, "passes": [{"distance_m": 4.0}, {"distance_m": 7.0}]}, "plan")
     configs = parse(PoolConfig, session.pool, "pool"), parse(SessionConfig, session.session, "session")
@@ -48,6 +53,15 @@ def gaps(*names: str) -> list[str]:
 def test_of_one_wall_alone_it_is_told_where_to_go() -> None:
     assert gaps("wall")[0].startswith("both sensors see one wall alone: pitch, yaw and lever arm y rest on the boat's")
     assert not any("one wall alone" in gap for gap in gaps("wall", "north"))
+
+
+@pytest.mark.parametrize(("lean_m", "told"), [(1.5, False), (2.5, True)])
+def test_a_slope_beside_the_wall_tells_the_height(lean_m: float, told: bool) -> None:
+    """By more than 17°: 6 m high, and its foot out by so much."""
+    wall = DOCK["target"]["faces"]["wall"]
+    slope = {"corners": [[-lean_m, 9, -4], [-lean_m, 3, -4], [0, 3, 2], [0, 9, 2]]}
+    found = gaps_of({"wall": wall, "slope": slope})
+    assert any("no horizontal face" in gap for gap in found) is not told
 
 
 def test_a_mirrored_pass_is_as_good() -> None:

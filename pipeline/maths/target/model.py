@@ -23,6 +23,7 @@ from pipeline.maths.target.face_tables import face_tables
 Array = NDArray[np.float64]
 
 LEAST_DEPTH_M = 0.1
+SLOPING_COSINE = 0.3  # of the normal's z: a face that leans by more than 17°
 ROLES = ("P1", "P2", "P3")  # roles of families in the patent's steps
 
 
@@ -43,6 +44,11 @@ class Family:
     def level(self) -> bool:
         """Return whether the faces are horizontal."""
         return bool(self.normal[2] > HORIZONTAL_COSINE)
+
+    @property
+    def sloping(self) -> bool:
+        """Return whether the faces lean so far from upright, without being level, that they tell a height."""
+        return bool(SLOPING_COSINE < abs(self.normal[2]) <= HORIZONTAL_COSINE)
 
 
 @dataclass(frozen=True)
