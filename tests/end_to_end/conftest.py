@@ -2,9 +2,11 @@
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from stages import ORDER
@@ -50,6 +52,13 @@ def finished(undisturbed: tuple[Path, Told]) -> Path:
 def recorded(small: Path) -> Recording:
     """What a survey software reads of the session."""
     return recording(small)
+
+
+@pytest.fixture(scope="session")
+def thinned(recorded: Recording) -> Recording:
+    """Every third ping: what is wrong must be told from these as well."""
+    kept = np.unique(recorded.t_ns, return_inverse=True)[1] % 3 == 0
+    return replace(recorded, t_ns=recorded.t_ns[kept], points_m=recorded.points_m[kept])
 
 
 @pytest.fixture(scope="session")
