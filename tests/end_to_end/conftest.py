@@ -1,4 +1,4 @@
-"""One small session, simulated and calibrated once a worker process; copies of it to spoil."""
+"""What is made of the small session and its run, once a worker process."""
 
 import json
 import shutil
@@ -11,35 +11,14 @@ import pytest
 
 from stages import ORDER
 from stages.commands.draw import Drawings, draw_missing
-from tests.support.places import Place, Told, digests, poolcal, result_of, simulate
+from tests.support.places import Told, result_of
 from tools.survey_software import Entry, Recording, entry_of, recording
-
-
-@pytest.fixture(scope="session")
-def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The session folder; its truth is beside it. Nobody changes it."""
-    return simulate(tmp_path_factory.mktemp("small") / "session")
 
 
 @pytest.fixture(scope="session")
 def truth(small: Path) -> dict[str, Any]:
     content: dict[str, Any] = json.loads(small.with_name("session.truth.json").read_text(encoding="utf-8"))
     return content
-
-
-@pytest.fixture(scope="session")
-def undisturbed(small: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Told]:
-    """The run folder of the small session, calibrated once with one job and left alone, and what was said."""
-    run = tmp_path_factory.mktemp("undisturbed") / "run"
-    told = poolcal("run", small, "--config", small / "pool.yaml", "--run", run, "--jobs", 1, "--report")
-    assert told.status == 0, told.err
-    return run, told
-
-
-@pytest.fixture(scope="session")
-def right(undisturbed: tuple[Path, Told]) -> dict[str, str]:
-    """Digests of every Parquet file of the undisturbed run."""
-    return digests(undisturbed[0])
 
 
 @pytest.fixture(scope="session")
@@ -65,20 +44,6 @@ def thinned(recorded: Recording) -> Recording:
 def entry(finished: Path) -> Entry:
     """The calibrated mount, as it is to be entered there."""
     return entry_of(result_of(finished))
-
-
-@pytest.fixture
-def place(small: Path, tmp_path: Path) -> Place:
-    made = Place(small, tmp_path)
-    made.mend()
-    return made
-
-
-@pytest.fixture
-def done(place: Place, undisturbed: tuple[Path, Told]) -> Place:
-    """A place whose run is complete; nothing is drawn."""
-    shutil.copytree(undisturbed[0], place.run, ignore=shutil.ignore_patterns("*.html"))
-    return place
 
 
 @pytest.fixture(scope="session")
