@@ -10,7 +10,7 @@ import pytest
 
 from stages.cli import call
 from stages.commands.entry import status_of
-from tests.support.places import Told
+from tests.support.places import POOLCAL, Told
 from tests.support.toy_commands import TOY, run_words, set_outcome, toy_poolcal
 from tests.support.toy_run import Pool
 
@@ -96,8 +96,9 @@ def test_an_answer_that_cannot_be_written_is_one_line(
     if words == ["verify"]:
         toy(*run_words(pool))
     given = {"verify": ["verify", pool.run_folder], "run": list(run_words(pool))}.get(words[-1], words)
+    command = POOLCAL if words[0].startswith("--") else TOY
     with Path("/dev/full").open("w") as full:
-        done = subprocess.run([*TOY, *map(str, given)], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+        done = subprocess.run([*command, *map(str, given)], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
     last = done.stderr.splitlines()[-1]
     assert done.returncode == 2
     assert last.startswith("poolcal: standard output: cannot be written (No space left on device)")

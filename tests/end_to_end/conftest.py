@@ -1,43 +1,27 @@
-"""One small session, simulated and calibrated once a worker process; copies of it to spoil."""
+"""What is made of the small session and its run, once a worker process."""
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from markupsafe import Markup
 
+import pipeline.results.pages.history
+import pipeline.results.pages.plots
 from stages import ORDER
 from stages.commands.draw import Drawings, draw_missing
-from tests.support.places import Place, Told, digests, poolcal, result_of, simulate
+from tests.support.places import Told, result_of
 from tools.survey_software import Entry, Recording, entry_of, recording
-
-
-@pytest.fixture(scope="session")
-def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The session folder; its truth is beside it. Nobody changes it."""
-    return simulate(tmp_path_factory.mktemp("small") / "session")
 
 
 @pytest.fixture(scope="session")
 def truth(small: Path) -> dict[str, Any]:
     content: dict[str, Any] = json.loads(small.with_name("session.truth.json").read_text(encoding="utf-8"))
     return content
-
-
-@pytest.fixture(scope="session")
-def undisturbed(small: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Told]:
-    """The run folder of the small session, calibrated once with one job and left alone, and what was said."""
-    run = tmp_path_factory.mktemp("undisturbed") / "run"
-    told = poolcal("run", small, "--config", small / "pool.yaml", "--run", run, "--jobs", 1, "--report")
-    assert told.status == 0, told.err
-    return run, told
-
-
-@pytest.fixture(scope="session")
-def right(undisturbed: tuple[Path, Told]) -> dict[str, str]:
-    """Digests of every Parquet file of the undisturbed run."""
-    return digests(undisturbed[0])
 
 
 @pytest.fixture(scope="session")
@@ -53,23 +37,16 @@ def recorded(small: Path) -> Recording:
 
 
 @pytest.fixture(scope="session")
+def thinned(recorded: Recording) -> Recording:
+    """Every third ping: what is wrong must be told from these as well."""
+    kept = np.unique(recorded.t_ns, return_inverse=True)[1] % 3 == 0
+    return replace(recorded, t_ns=recorded.t_ns[kept], points_m=recorded.points_m[kept])
+
+
+@pytest.fixture(scope="session")
 def entry(finished: Path) -> Entry:
     """The calibrated mount, as it is to be entered there."""
     return entry_of(result_of(finished))
-
-
-@pytest.fixture
-def place(small: Path, tmp_path: Path) -> Place:
-    made = Place(small, tmp_path)
-    made.mend()
-    return made
-
-
-@pytest.fixture
-def done(place: Place, undisturbed: tuple[Path, Told]) -> Place:
-    """A place whose run is complete; nothing is drawn."""
-    shutil.copytree(undisturbed[0], place.run, ignore=shutil.ignore_patterns("*.html"))
-    return place
 
 
 @pytest.fixture(scope="session")
@@ -80,3 +57,14 @@ def drawn(undisturbed: tuple[Path, Told], tmp_path_factory: pytest.TempPathFacto
     assert draw_missing(run, Drawings(report=True, recordings=True)) == []
     assert sorted(path.stem for path in run.glob("*/*.rrd")) == sorted(ORDER)
     return run
+
+
+@pytest.fixture
+def unpainted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures of pages are empty, where a test reads the words: they take six sevenths of the time of a page."""
+
+    def empty(*_: object) -> Markup:
+        return Markup('<img class="picture" alt="empty" src="data:image/svg+xml;base64,">')
+
+    monkeypatch.setattr(pipeline.results.pages.plots, "draw_picture", empty)
+    monkeypatch.setattr(pipeline.results.pages.history, "picture", empty)

@@ -95,6 +95,7 @@ def test_soundings_by_the_results_covariance(undisturbed: tuple[Path, Told]) -> 
     assert [row[3:] for row in rows.values()] == [["253", "155"], ["261", "168"], ["292", "212"], ["451", "404"]]
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_digests_are_of_the_files_themselves(done: Place) -> None:
     assert done.calibrate("--report").status == 0
     rows = dict(_digest_rows(done.run))
@@ -115,6 +116,7 @@ def _digest_rows(run: Path) -> list[list[str]]:
     return found
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_about_is_text_and_makes_nothing_stale(done: Place, right: dict[str, str]) -> None:
     assert "vessel not stated" in flat(drawn_again(done.run))
     done.edit_session("", about=ABOUT)
@@ -136,6 +138,7 @@ def test_about_is_text_and_makes_nothing_stale(done: Place, right: dict[str, str
     assert "about." not in "".join(row[1] for row in page.table("from", "key", "value"))
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_a_rejected_run_is_marked_and_has_no_line_to_sign(done: Place) -> None:
     done.edit_config("verdict", max_sigma_deg=1e-6)
     assert done.calibrate("--report").status == 1
@@ -154,6 +157,7 @@ def test_a_rejected_run_is_marked_and_has_no_line_to_sign(done: Place) -> None:
         assert promise not in text
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_words_of_the_crew_stay_as_they_are_in_another_language(done: Place, monkeypatch: pytest.MonkeyPatch) -> None:
     """A vessel may be called by a word of the catalogue."""
     monkeypatch.setenv("POOLCAL_LANG", "zh")
@@ -183,6 +187,7 @@ def test_without_a_solution_there_are_dashes(small: Path, tmp_path: Path) -> Non
     assert not re.search(r"\bnan\b", text.lower())
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_a_method_without_sigmas_gives_no_certificate(done: Place) -> None:
     done.edit_config("", result="patent_alternating")
     status = done.calibrate("--report").status
@@ -193,6 +198,7 @@ def test_a_method_without_sigmas_gives_no_certificate(done: Place) -> None:
         assert "This method gives no uncertainties of its own." in text
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_an_older_run_folder_says_what_it_does_not_know(done: Place) -> None:
     path = done.run / "run.yaml"
     content = yaml.safe_load(path.read_text(encoding="utf-8"))
@@ -252,6 +258,7 @@ def test_report_refuses_what_is_not_finished(done: Place, tmp_path: Path) -> Non
     assert not pdf.exists()
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_names_that_came_after_the_run_are_not_left_out_in_silence(done: Place, tmp_path: Path) -> None:
     """session.yaml got its block about after the run: the page would show none of it."""
     pdf = tmp_path / "out.pdf"

@@ -8,12 +8,29 @@ from typing import Any
 import numpy as np
 import pytest
 
+import stages.commands.check_entry
+from pipeline.entry_check.check import EntryCheck, check_entry
+from pipeline.results.finished_run import FinishedRun
 from tests.support.effort import often
 from tests.support.files.gsf_survey import write_gsf
 from tests.support.places import poolcal
 from tools.survey_software import Entry, Recording, georeferenced, in_crs, write_points
 
 UTM = "EPSG:32651"
+
+
+@pytest.fixture(autouse=True)
+def compared_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What JSON, text and the signs of a program tell of the same file is one comparison, which takes seconds."""
+    kept: dict[object, EntryCheck] = {}
+
+    def compared(run: FinishedRun, path: Path, crs: str | None, other_heights: bool) -> EntryCheck:
+        question = (path.read_bytes(), crs, other_heights)
+        if question not in kept:
+            kept[question] = check_entry(run, path, crs, other_heights)
+        return kept[question]
+
+    monkeypatch.setattr(stages.commands.check_entry, "check_entry", compared)
 
 
 def asked(finished: Path, file: Path, *more: object) -> tuple[int, dict[str, Any]]:
@@ -33,11 +50,13 @@ def asked(finished: Path, file: Path, *more: object) -> tuple[int, dict[str, Any
     ],
 )
 def test_a_right_entry_passes(
-    finished: Path, recorded: Recording, entry: Entry, tmp_path: Path,
+    finished: Path, recorded: Recording, thinned: Recording, entry: Entry, tmp_path: Path,
     name: str, crs: str, decimals: int, geographic: bool,
 ) -> None:  # fmt: skip
+    """The first form with all soundings."""
     roll, pitch, heading = (round(angle, 2) for angle in entry.angles_deg)  # as typed in
-    placed = georeferenced(recorded, replace(entry, angles_deg=(roll, pitch, heading)))
+    exported = recorded if name == "测深.xyz" else thinned
+    placed = georeferenced(exported, replace(entry, angles_deg=(roll, pitch, heading)))
     write_points(tmp_path / name, in_crs(placed, crs), decimals, geographic)
     status, found = asked(finished, tmp_path / name, "--crs", crs)
     assert (status, found["answer"]) == (0, "right")
@@ -55,12 +74,12 @@ def test_a_right_entry_passes(
     ],
 )
 def test_a_mistake_is_named(
-    finished: Path, recorded: Recording, entry: Entry, tmp_path: Path, changed: dict[str, Any], code: str
+    finished: Path, thinned: Recording, entry: Entry, tmp_path: Path, changed: dict[str, Any], code: str
 ) -> None:
     signs = {key: value for key, value in changed.items() if isinstance(value, tuple)}
     values = {key: tuple(np.multiply(getattr(entry, key), value)) for key, value in signs.items()}
     file = tmp_path / "a.xyz"
-    write_points(file, in_crs(georeferenced(recorded, replace(entry, **(changed | values))), UTM), 3)
+    write_points(file, in_crs(georeferenced(thinned, replace(entry, **(changed | values))), UTM), 3)
     status, found = asked(finished, file)
     assert status == 1
     assert [set(one["codes"]) - {"right", "plain"} for one in found["explanations"]] == [{code}]
@@ -87,10 +106,10 @@ def test_a_mistake_is_named(
     ],
 )
 def test_a_right_entry_with_something_else_wrong(
-    finished: Path, recorded: Recording, entry: Entry, tmp_path: Path, changed: dict[str, Any], code: str, said: str
+    finished: Path, thinned: Recording, entry: Entry, tmp_path: Path, changed: dict[str, Any], code: str, said: str
 ) -> None:
     file = tmp_path / "a.xyz"
-    write_points(file, in_crs(georeferenced(recorded, replace(entry, **changed)), UTM), 3)
+    write_points(file, in_crs(georeferenced(thinned, replace(entry, **changed)), UTM), 3)
     status, found = asked(finished, file)
     assert (status, found["answer"]) == (1, "right_but")
     assert [set(one["codes"]) - {"right", "plain"} for one in found["explanations"]] == [{code}]
@@ -107,11 +126,11 @@ def test_a_right_entry_with_something_else_wrong(
     ],
 )
 def test_other_rays_or_positions_prove_nothing_and_accuse_nobody(
-    finished: Path, recorded: Recording, entry: Entry, tmp_path: Path, wrong: dict[str, Any], other: dict[str, Any]
+    finished: Path, thinned: Recording, entry: Entry, tmp_path: Path, wrong: dict[str, Any], other: dict[str, Any]
 ) -> None:
     values = {key: tuple(np.add(getattr(entry, key), value)) for key, value in wrong.items()}
     file = tmp_path / "a.xyz"
-    write_points(file, in_crs(georeferenced(recorded, replace(entry, **(other | values))), UTM), 3)
+    write_points(file, in_crs(georeferenced(thinned, replace(entry, **(other | values))), UTM), 3)
     status, found = asked(finished, file)
     assert (status, found["answer"]) == (1, "uncertain")
     text = poolcal("check-entry", finished, file).out
@@ -124,8 +143,10 @@ PARTS = ["half of each fan", "first pass", "every third ping", "without a fifth 
 
 @pytest.mark.parametrize("kept", often(PARTS[:1], PARTS))
 def test_parts_of_the_soundings_will_do(
-    finished: Path, recorded: Recording, entry: Entry, tmp_path: Path, kept: str
+    finished: Path, recorded: Recording, thinned: Recording, entry: Entry, tmp_path: Path, kept: str
 ) -> None:
+    """Half of each fan of every third ping."""
+    recorded = thinned if kept == PARTS[0] else recorded
     t_s = (recorded.t_ns - recorded.t_ns[0]) / 1e9
     ping = np.unique(recorded.t_ns, return_inverse=True)[1]
     wanted = {
@@ -145,18 +166,18 @@ def test_parts_of_the_soundings_will_do(
 
 
 def test_lines_with_other_values_are_no_right_entry(
-    finished: Path, recorded: Recording, entry: Entry, tmp_path: Path
+    finished: Path, thinned: Recording, entry: Entry, tmp_path: Path
 ) -> None:
-    file, placed, late = tmp_path / "a.xyz", georeferenced(recorded, entry), recorded.t_ns > np.median(recorded.t_ns)
-    other = georeferenced(recorded, replace(entry, angles_deg=tuple(np.add(entry.angles_deg, 0.8))))
+    file, placed, late = tmp_path / "a.xyz", georeferenced(thinned, entry), thinned.t_ns > np.median(thinned.t_ns)
+    other = georeferenced(thinned, replace(entry, angles_deg=tuple(np.add(entry.angles_deg, 0.8))))
     write_points(file, in_crs(np.where(late[:, None], other, placed), UTM), 3)
     assert asked(finished, file)[0] == 1
     assert "or not all were placed with the same mount" in " ".join(poolcal("check-entry", finished, file).out.split())
 
 
-def test_heights_of_another_surface(finished: Path, recorded: Recording, entry: Entry, tmp_path: Path) -> None:
+def test_heights_of_another_surface(finished: Path, thinned: Recording, entry: Entry, tmp_path: Path) -> None:
     file = tmp_path / "a.csv"
-    points = in_crs(georeferenced(recorded, entry), UTM, lift_m=-8.312)
+    points = in_crs(georeferenced(thinned, entry), UTM, lift_m=-8.312)
     write_points(file, points * [1, 1, -1], 3, header="E,N,Depth")
     told = poolcal("check-entry", finished, file)
     assert told.status == 0
@@ -169,27 +190,27 @@ def test_heights_of_another_surface(finished: Path, recorded: Recording, entry: 
 
 
 def test_a_gsf_file_names_signs_but_proves_no_hundredth_of_a_degree(
-    finished: Path, recorded: Recording, entry: Entry, tmp_path: Path
+    finished: Path, thinned: Recording, entry: Entry, tmp_path: Path
 ) -> None:
-    file, water_m = tmp_path / "a.gsf", float(np.median(recorded.ins["height_m"])) - 1.3
-    write_gsf(file, recorded, georeferenced(recorded, entry), water_m)
+    file, water_m = tmp_path / "a.gsf", float(np.median(thinned.ins["height_m"])) - 1.3
+    write_gsf(file, thinned, georeferenced(thinned, entry), water_m)
     status, found = asked(finished, file)
     assert (status, found["answer"]) == (1, "uncertain")
     assert found["limit_deg"] < 0.2
     assert "rounds its places to a centimetre" in poolcal("check-entry", finished, file).out
     (r, p, h) = entry.angles_deg
-    write_gsf(file, recorded, georeferenced(recorded, replace(entry, angles_deg=(-r, p, h))), water_m)
+    write_gsf(file, thinned, georeferenced(thinned, replace(entry, angles_deg=(-r, p, h))), water_m)
     status, found = asked(finished, file)
     assert (status, found["answer"]) == (1, "wrong")
     assert {one["codes"][0] for one in found["explanations"]} == {"sign_roll"}
 
 
 def test_the_values_stand_in_the_signs_of_the_program_too(
-    finished: Path, recorded: Recording, entry: Entry, tmp_path: Path
+    finished: Path, thinned: Recording, entry: Entry, tmp_path: Path
 ) -> None:
     """Qimera's heading is + to starboard: what stands there wrongly is poolcal's number, and looks entry."""
     file, (roll, pitch, heading) = tmp_path / "a.xyz", entry.angles_deg
-    write_points(file, in_crs(georeferenced(recorded, replace(entry, angles_deg=(roll, pitch, -heading))), UTM), 3)
+    write_points(file, in_crs(georeferenced(thinned, replace(entry, angles_deg=(roll, pitch, -heading))), UTM), 3)
     told = poolcal("check-entry", finished, file, "--to", "qimera")
     assert (told.status, told.err) == (1, "")
     (line,) = [line for line in told.out.splitlines() if line.startswith("yaw (bow to starboard +")]

@@ -16,9 +16,9 @@ UTM = "EPSG:32651"
 
 
 def test_another_zone_is_named_and_swapped_axes_are_read(
-    finished: Path, recorded: Recording, entry: Entry, tmp_path: Path
+    finished: Path, thinned: Recording, entry: Entry, tmp_path: Path
 ) -> None:
-    file, placed = tmp_path / "a.xyz", georeferenced(recorded, entry)
+    file, placed = tmp_path / "a.xyz", georeferenced(thinned, entry)
     write_points(file, in_crs(placed, "EPSG:32650"), 3)
     told = poolcal("check-entry", finished, file, "--crs", UTM)
     assert (told.status, told.out, told.err.count("\n")) == (2, "", 1)
@@ -67,9 +67,9 @@ def test_a_cloud_of_poolcal_itself_proves_nothing(finished: Path, tmp_path: Path
     assert "proves nothing of another program" in told.err
 
 
-def test_a_grid_is_refused(finished: Path, recorded: Recording, entry: Entry, tmp_path: Path) -> None:
+def test_a_grid_is_refused(finished: Path, thinned: Recording, entry: Entry, tmp_path: Path) -> None:
     file = tmp_path / "a.xyz"
-    points = in_crs(georeferenced(recorded, entry), UTM)
+    points = in_crs(georeferenced(thinned, entry), UTM)
     cells, first = np.unique(np.floor(points[:, :2] / 0.25), axis=0, return_index=True)
     write_points(file, np.column_stack([(cells + 0.5) * 0.25, points[first, 2]]), 3)
     told = poolcal("check-entry", finished, file, "--crs", UTM)
@@ -77,11 +77,11 @@ def test_a_grid_is_refused(finished: Path, recorded: Recording, entry: Entry, tm
     assert "a grid of 0.25 m" in told.err
 
 
-def test_another_session_is_refused(finished: Path, recorded: Recording, entry: Entry, tmp_path: Path) -> None:
+def test_another_session_is_refused(finished: Path, thinned: Recording, entry: Entry, tmp_path: Path) -> None:
     """The same target and mount, but another track and noise of its own."""
-    noise = np.random.default_rng(6).normal(0, 0.01, (len(recorded.t_ns), 1))
+    noise = np.random.default_rng(6).normal(0, 0.01, (len(thinned.t_ns), 1))
     other = replace(
-        recorded, points_m=recorded.points_m * (1 + noise / np.linalg.norm(recorded.points_m, axis=1)[:, None])
+        thinned, points_m=thinned.points_m * (1 + noise / np.linalg.norm(thinned.points_m, axis=1)[:, None])
     )
     file = tmp_path / "a.xyz"
     write_points(file, in_crs(georeferenced(other, replace(entry, wander_m=0.3)), UTM), 3)
@@ -92,11 +92,11 @@ def test_another_session_is_refused(finished: Path, recorded: Recording, entry: 
 
 @pytest.mark.parametrize("ending", often(["xyz", "gsf"], ["xyz", "las", "laz", "gsf"]))
 def test_a_file_that_was_cut_is_used_as_far_as_it_goes_or_refused_in_one_line(
-    finished: Path, recorded: Recording, entry: Entry, tmp_path: Path, ending: str
+    finished: Path, thinned: Recording, entry: Entry, tmp_path: Path, ending: str
 ) -> None:
-    file, placed = tmp_path / f"a.{ending}", georeferenced(recorded, entry)
+    file, placed = tmp_path / f"a.{ending}", georeferenced(thinned, entry)
     if ending == "gsf":
-        write_gsf(file, recorded, placed, float(np.median(recorded.ins["height_m"])) - 1.3)
+        write_gsf(file, thinned, placed, float(np.median(thinned.ins["height_m"])) - 1.3)
     else:
         write_points(file, in_crs(placed, UTM), 3)
     content = file.read_bytes()

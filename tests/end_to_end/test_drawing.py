@@ -3,6 +3,7 @@
 import errno
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -82,10 +83,12 @@ def test_a_process_that_dies_is_said(done: Place, monkeypatch: pytest.MonkeyPatc
     assert drawn_in(done.run) == []
 
 
-def test_nothing_is_started_where_nothing_is_to_be_drawn(done: Place, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert done.calibrate("--report", "--recordings").status == 0
+def test_nothing_is_started_where_nothing_is_to_be_drawn(
+    place: Place, drawn: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copytree(drawn, place.run)
     monkeypatch.setattr(subprocess, "Popen", None)
-    assert poolcal(*done.words()[:-1], 2, "--report", "--recordings").complaints == []
+    assert poolcal(*place.words()[:-1], 2, "--report", "--recordings").complaints == []
 
 
 def test_no_room_for_another_process(done: Place, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -145,13 +148,13 @@ def test_a_full_disk_is_one_line_and_no_stump(done: Place, monkeypatch: pytest.M
     assert not [path for path in done.run.rglob("*") if path.suffix in (".rrd", ".new", ".partial")]
 
 
-def test_nothing_missing_nothing_said(done: Place) -> None:
+def test_nothing_missing_nothing_said(place: Place, drawn: Path) -> None:
     """A folder that is in use, or that cannot be written, is checked all the same."""
-    assert done.calibrate("--recordings").status == 0
-    with locked(done.run, ORDER):
-        assert draw_missing(done.run, RECORDINGS) == []
-        (done.run / "adjust" / "adjust.rrd").unlink()
-        (failure,) = draw_missing(done.run, RECORDINGS)
+    shutil.copytree(drawn, place.run)
+    with locked(place.run, ORDER):
+        assert draw_missing(place.run, RECORDINGS) == []
+        (place.run / "adjust" / "adjust.rrd").unlink()
+        (failure,) = draw_missing(place.run, RECORDINGS)
     assert "is in use" in failure.reason
 
 

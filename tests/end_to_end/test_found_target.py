@@ -29,8 +29,13 @@ def config(folder: Path, **more: Any) -> Path:
     return file
 
 
-def run(dock: Path, file: Path, folder: Path, jobs: int = 1) -> Told:
-    return poolcal("run", dock, "--config", file, "--run", folder, "--jobs", jobs)
+def run(dock: Path, file: Path, folder: Path) -> Told:
+    return poolcal("run", dock, "--config", file, "--run", folder, "--jobs", 1)
+
+
+def begun(dock: Path, file: Path, folder: Path, jobs: int = 1) -> Told:
+    """The first stage alone: before it the target is found, as before a whole run."""
+    return poolcal("stage", "ingest", folder, "--session", dock, "--config", file, "--jobs", jobs)
 
 
 def faces(folder: Path) -> dict[str, Any]:
@@ -41,15 +46,16 @@ def faces(folder: Path) -> dict[str, Any]:
 
 def test_it_is_found_once_and_again_when_what_it_depends_on_changes(dock: Path, tmp_path: Path) -> None:
     folders = [tmp_path / f"run-{jobs}" for jobs in (1, 2)]
-    for jobs, folder in enumerate(folders, start=1):
-        told = run(dock, config(tmp_path), folder, jobs)
-        assert told.status in (0, 1), told.err
-        assert told.ran[-1] == "report"
-        assert "exchanged" not in told.out  # a found target has no left and right to be wrong
-        calibration = json.loads((folder / "report" / "calibration.json").read_text(encoding="utf-8"))
-        assert "target_found" in calibration["warning_codes"]
-        assert "wall-1, wall-2, wall-3" in told.out
-        assert "could be adjusted" not in told.out  # walls tell no height, and yet labels are without the drift
+    told = run(dock, config(tmp_path), folders[0])
+    assert told.status in (0, 1), told.err
+    assert told.ran[-1] == "report"
+    assert "exchanged" not in told.out  # a found target has no left and right to be wrong
+    calibration = json.loads((folders[0] / "report" / "calibration.json").read_text(encoding="utf-8"))
+    assert "target_found" in calibration["warning_codes"]
+    assert "wall-1, wall-2, wall-3" in told.out
+    assert "could be adjusted" not in told.out  # walls tell no height, and yet labels are without the drift
+    assert begun(dock, config(tmp_path), folders[1], jobs=2).ran == ["ingest"]
+    for folder in folders:
         assert sorted(faces(folder)) == ["wall-1", "wall-2", "wall-3"]
     memories = [folder / FOUND for folder in folders]
     assert memories[0].read_bytes() == memories[1].read_bytes()
@@ -60,10 +66,10 @@ def test_it_is_found_once_and_again_when_what_it_depends_on_changes(dock: Path, 
     before = when()
     told = run(dock, config(tmp_path), folders[0])
     assert (told.ran, when()) == ([], before)
-    told = run(dock, config(tmp_path, strike=["wall-3"]), folders[0])  # no other target was found
+    assert begun(dock, config(tmp_path, strike=["wall-3"]), folders[0]).status == 0  # no other target was found
     assert sorted(faces(folders[0])) == ["wall-1", "wall-2"]
     assert when() == before
-    run(dock, config(tmp_path, depth_m=3.0), folders[0])
+    assert begun(dock, config(tmp_path, depth_m=3.0), folders[0]).status == 0
     assert when() > before
     assert min(corner[2] for corner in faces(folders[0])["wall-1"]["corners"]) == pytest.approx(-3.0, abs=0.1)
 
@@ -73,8 +79,8 @@ def test_a_damaged_memory_is_none(dock: Path, tmp_path: Path, damaged: str) -> N
     folder = tmp_path / "run"
     folder.mkdir()
     (folder / FOUND).write_text(damaged, encoding="utf-8")
-    told = run(dock, config(tmp_path), folder)
-    assert told.status in (0, 1), told.err
+    told = begun(dock, config(tmp_path), folder)
+    assert told.status == 0, told.err
     assert set(json.loads((folder / FOUND).read_text(encoding="utf-8"))) == {"key", "found"}
 
 
@@ -86,7 +92,7 @@ def test_what_says_nothing_true_is_refused(dock: Path, tmp_path: Path) -> None:
     one_line(run(dock, everything, folder), "target.strike", "no face is left")
     one_line(run(dock, config(tmp_path, depth_m=-4), folder), "target.depth_m")
     one_line(run(dock, config(tmp_path, faces={}), folder), "target.faces")
-    assert run(dock, config(tmp_path), folder).status in (0, 1)  # the folder is as good as new
+    assert begun(dock, config(tmp_path), folder).status == 0  # the folder is as good as new
     one_line(run(dock, config(tmp_path), dock / "run"), "lies in the session folder")
     assert not (dock / "run").exists()
 

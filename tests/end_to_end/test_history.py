@@ -47,6 +47,7 @@ def test_in_order_of_time_with_the_jump_alone(runs: Path) -> None:
     np.testing.assert_allclose(text["z_m"], table["z_m"], rtol=1e-12)
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_each_comparison_says_what_it_could_have_seen(undisturbed: tuple[Path, Told], tmp_path: Path) -> None:
     """As poolcal diff says it; a result of an older version is compared by its total covariance, and sees less."""
     folder, template = tmp_path / "runs", undisturbed[0]
@@ -83,6 +84,7 @@ def test_names_are_text(runs: Path) -> None:
     assert 'class="quiet"' in page
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_filters(runs: Path, tmp_path: Path) -> None:
     for words, expected in (
         (("--name", "MO*"), ["moved"]),
@@ -96,6 +98,7 @@ def test_filters(runs: Path, tmp_path: Path) -> None:
         shutil.rmtree(out)
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_broken_runs_are_named_and_left_out(runs: Path) -> None:
     (runs / "moved" / "report" / "calibration.json").write_text("{")
     (runs / "after" / "report" / "calibration.json").write_text('{"verdict": "accepted", "mbes": 3}')
@@ -116,6 +119,7 @@ def content_of(run: Path) -> dict[str, Any]:
     return content
 
 
+@pytest.mark.usefixtures("unpainted")
 @pytest.mark.parametrize("start", ["=1+$x_{$", "2026-05-04", "2026-13-04T08:00:00Z", "", 3, None, "x" * 10_000])
 def test_a_start_that_is_no_time_leaves_its_run_out(runs: Path, start: object) -> None:
     """It would be a formula in the table, and mathematics in the chart."""
@@ -128,6 +132,7 @@ def test_a_start_that_is_no_time_leaves_its_run_out(runs: Path, start: object) -
     assert table_of(runs)["run"].tolist() == ["b_first", "a_second", "refused", "after", "nothing"]
 
 
+@pytest.mark.usefixtures("unpainted")
 @pytest.mark.parametrize("value", ["[" * 100_000, '{"verdict": "accepted", "methods": [1]}'])
 def test_one_crafted_run_does_not_stop_the_others(runs: Path, value: str) -> None:
     (runs / "moved" / "report" / "calibration.json").write_text(value)
@@ -137,6 +142,7 @@ def test_one_crafted_run_does_not_stop_the_others(runs: Path, value: str) -> Non
     assert len(table_of(runs)) == 5
 
 
+@pytest.mark.usefixtures("unpainted")
 @pytest.mark.parametrize("value", [10**400, "1e400", "inf"])
 def test_numbers_beyond_all_bounds_are_left_out(runs: Path, value: object) -> None:
     content = content_of(runs / "moved")
@@ -146,6 +152,7 @@ def test_numbers_beyond_all_bounds_are_left_out(runs: Path, value: object) -> No
     assert len(table_of(runs)) == 5
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_a_result_that_may_not_be_entered_is_left_out(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (runs / "closed" / "report").mkdir(parents=True)
     (runs / "closed" / "run.yaml").write_text("")
@@ -163,6 +170,7 @@ def test_a_result_that_may_not_be_entered_is_left_out(runs: Path, monkeypatch: p
     assert told.err == f"left out: {runs / 'closed'}: {why}\n"
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_no_link_is_written_through(runs: Path, tmp_path: Path) -> None:
     mine = tmp_path / "thesis.tex"
     mine.write_text("two years of work")
@@ -175,6 +183,7 @@ def test_no_link_is_written_through(runs: Path, tmp_path: Path) -> None:
     assert len(table_of(runs)) == 6
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_what_was_kept_of_a_replaced_run_is_no_run_of_its_own(runs: Path) -> None:
     shutil.copytree(runs / "moved" / "report", runs / "moved" / "report.1")
     assert poolcal("history", runs).status == 0

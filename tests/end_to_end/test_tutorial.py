@@ -3,6 +3,7 @@
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -86,6 +87,7 @@ def test_the_tutorial(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert [*_verdicts(reader.types("run", "runs/day1"))] == ["ACCEPTED"]
     assert "every error is within 4 sigma" in _ok(reader.types("compare", "runs/tutorial1"))
 
+    shutil.copytree("runs/tutorial1", "runs/kept")
     edit(SESSION, "mbes", latency_s=0.010)
     late = reader.types("run", "runs/day1")
     assert (late.status, [*_verdicts(late)]) == (1, ["REJECTED"])
@@ -95,7 +97,10 @@ def test_the_tutorial(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert abs(float(named[1]) + 10) <= 2 * float(named[2])
     assert Path("runs/tutorial1/report.1/calibration.json").is_file()
     edit(SESSION, "mbes", latency_s=0.0)
-    assert _ok(poolcal("run", "runs/day1", "--config", "runs/day1/pool.yaml", "--run", "runs/tutorial1"))
+    shutil.rmtree("runs/tutorial1")
+    Path("runs/kept").rename("runs/tutorial1")
+    again = poolcal("run", "runs/day1", "--config", "runs/day1/pool.yaml", "--run", "runs/tutorial1")
+    assert (again.status, again.ran) == (0, [])  # as it was, and as the first run left it
 
     (knocked,) = FENCED.findall(TUTORIAL)
     Path("runs/knocked.yaml").write_text(knocked, encoding="utf-8")

@@ -47,15 +47,15 @@ def test_one_window_gives_its_whole_ping_but_for_beams_beyond_a_gap(reverse: boo
     boat = Boat()
     points = boat.placed(rotation(ANGLES), LEVER)[::-1] if reverse else boat.placed(rotation(ANGLES), LEVER)
     kept = np.ones(len(points), bool)
-    gap = 3 * BEAMS + 30  # in the fourth ping
+    gap = 3 * BEAMS + 15  # in the fourth ping
     place = len(points) - 1 - np.arange(len(points)) if reverse else np.arange(len(points))
     kept[place[gap]] = False
     rows = np.arange(kept.sum())
     where = np.cumsum(kept) - 1  # row of each point
-    own = 3 * BEAMS + np.arange(10, 15)
+    own = 3 * BEAMS + np.arange(5, 10)
     windows = Windows(own[None], where[place[own]][None], 1)
     (found, other), share = whole_pings(windows, boat.soundings, points[kept], rows, 0.002)
-    assert found.tolist() == list(range(3 * BEAMS, 3 * BEAMS + 30))
+    assert found.tolist() == list(range(3 * BEAMS, 3 * BEAMS + 15))
     assert other.tolist() == where[place[found]].tolist()
     assert share == pytest.approx(30 / 40)
 
@@ -72,7 +72,7 @@ def test_a_sounding_that_the_file_holds_twice_has_two_pairs() -> None:
     boat = Boat()
     once = boat.placed(rotation(ANGLES), LEVER)
     both = np.concatenate([once, once + np.array([0.1, 0.0, 0.0])])
-    own = 3 * BEAMS + np.arange(10, 15)
+    own = 3 * BEAMS + np.arange(5, 10)
     windows = Windows(np.stack([own, own]), np.stack([own, own + len(once)]), 1)
     (found, other), _ = whole_pings(windows, boat.soundings, both, np.arange(len(both)), 0.002)
     assert found.tolist() == np.repeat(3 * BEAMS + np.arange(BEAMS), 2).tolist()

@@ -13,11 +13,12 @@ from pipeline.errors import RawDataError
 from pipeline.simulation.session import SimulatedSession
 from tests.support.effort import often
 from tests.support.mount_errors import rotation_error
-from tests.support.simulated import QUIET, calibrated, made_with_heads, without_biases
+from tests.support.simulated import QUIET, calibrated, made_with_heads, through, without_biases
 
 FIRST = {"roll_deg": -48.8, "pitch_deg": 1.2, "yaw_deg": -2.0, "x_m": 0.30, "y_m": 0.20, "z_m": -2.01}
 SECOND = {"roll_deg": -38.0, "pitch_deg": -0.9, "yaw_deg": 1.6, "x_m": -0.30, "y_m": -0.25, "z_m": -2.05}
 BOTH = (FIRST, SECOND)
+COARSE = {"ins": {"rate_hz": 50.0}, "laser": {"point_rate_hz": 2500.0}, "mbes": {"ping_rate_hz": 5.0}}
 NOISE_TO_99_9 = 32.9  # χ² of twelve degrees of freedom
 
 
@@ -42,7 +43,7 @@ def errors(result: Mapping[str, Any], session: SimulatedSession) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def noisy_two() -> SimulatedSession:
-    return made_with_heads(mounts=BOTH)
+    return made_with_heads(COARSE, mounts=BOTH)
 
 
 @pytest.fixture(scope="module")
@@ -121,14 +122,16 @@ def test_a_head_whose_clock_is_off_is_named(noisy_two: SimulatedSession, wrong: 
 
 
 def test_one_head_beyond_its_limits_rejects_the_whole_and_is_named(noisy_two: SimulatedSession) -> None:
-    """Of the second head a ping in eight is left: its sigmas are larger. The limit lies between both heads' rolls."""
+    """Of the second head a ping in four is left: its sigmas are larger. The limit lies between both heads' rolls."""
     records = noisy_two.raw["mbes_2"]
-    few = {name: values[records["ping"] % 8 == 0] for name, values in records.items()}
-    sigmas = [head["sigma_mount_total"] for head in result_of(calibrated(noisy_two, raw={"mbes_2": few}))["heads"]]
+    few = {name: values[records["ping"] % 4 == 0] for name, values in records.items()}
+    found = calibrated(noisy_two, raw={"mbes_2": few})
+    sigmas = [head["sigma_mount_total"] for head in result_of(found)["heads"]]
     limit = (sigmas[0]["roll_deg"] + sigmas[1]["roll_deg"]) / 2
     assert 1.1 * sigmas[0]["roll_deg"] < sigmas[1]["roll_deg"]
     verdict = {"max_sigma_deg": limit, "max_sigma_m": 1.0}
-    result = result_of(calibrated(noisy_two, raw={"mbes_2": few}, pool={"verdict": verdict}))
+    known = through("adjust", found)
+    result = result_of(calibrated(noisy_two, raw={"mbes_2": few}, pool={"verdict": verdict}, known=known))
     assert result["verdict"] == "rejected"
     assert [head["verdict"] for head in result["heads"]] == ["accepted", "rejected"]
     assert set(result["reason_codes"]) == {"sigma_above_limit"}

@@ -25,7 +25,8 @@ FOOTING = {"name": "footing", "low_m": [-0.07, -2.0, -4.0], "high_m": [0.0, 4.0,
 
 def at(place: dict[str, Any], *more: dict[str, Any], seed: int = 3) -> tuple[Any, dict[str, Any], dict[str, Any]]:
     """A session with wet faces of which nothing is known, its artefacts and its result."""
-    session = made(place, {"ins": {"drift": {"horizontal_m": 0.01, "vertical_m": 0.01}}}, *more, seed=seed)
+    ins = {"rate_hz": 50.0, "drift": {"horizontal_m": 0.01, "vertical_m": 0.01}}
+    session = made(place, {"ins": ins}, *more, seed=seed)
     found = calibrated(session, pool=UNSURVEYED)
     return session, found, json.loads(found["report/calibration.json"])
 

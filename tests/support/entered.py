@@ -12,7 +12,7 @@ COARSE = {"roll": -48.0, "pitch": 2.0, "yaw": -2.8}
 LEVER, COARSE_LEVER = np.array([0.30, 0.20, -2.01]), np.array([0.38, 0.12, -2.09])
 LASER = Mounted(np.eye(3), np.array([0.21, 0.48, 1.10]))
 LETTERS = {"roll": "Y", "pitch": "X", "yaw": "Z"}
-PINGS, BEAMS, PING_S = 60, 40, 0.1
+PINGS, BEAMS, PING_S = 60, 20, 0.1
 
 
 def rotation(angles: dict[str, float], order: str = "yaw pitch roll") -> np.ndarray:
@@ -48,7 +48,7 @@ class Boat:
                                  for k in range(len(headings_deg))])  # fmt: skip
         self.sounding_s = np.repeat(ping_s, BEAMS)
         beam = np.tile(np.arange(BEAMS), len(ping_s))
-        theta = np.radians(-25 + 1.2 * beam)
+        theta = np.radians(-25 + 48 / BEAMS * beam)
         away = np.repeat(6 + 2 * np.sin(0.7 * np.arange(len(ping_s))), BEAMS)  # else all soundings lie in one line
         ranges = away / np.maximum(np.cos(theta), 0.5) + random.normal(0, 0.01, len(theta))
         self.x_mbes = np.stack([np.sin(theta), np.zeros_like(theta), -np.cos(theta)], 1) * ranges[:, None]

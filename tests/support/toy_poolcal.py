@@ -67,8 +67,11 @@ def _run(inputs: Inputs, config: Config) -> Outputs:
     return Outputs(json.dumps(result) + "\n")
 
 
-def install(put: Callable[[object, str, object], object]) -> dict[str, types.ModuleType]:
-    """Put the toys in the place of what they replace; the modules that ``sys.modules`` must hold are returned."""
+def install(put: Callable[[object, str, object], object], repeat: bool = True) -> dict[str, types.ModuleType]:
+    """Put the toys in the place of what they replace; the modules that ``sys.modules`` must hold are returned.
+
+    Without ``repeat`` the command of that name has none: it imports matplotlib, half of the time of a start.
+    """
     report = types.ModuleType("stages.report")
     report.__file__ = __file__
     vars(report).update(Config=Config, Inputs=Inputs, Outputs=Outputs, run=_run)
@@ -83,15 +86,17 @@ def install(put: Callable[[object, str, object], object]) -> dict[str, types.Mod
     put(stages, "ORDER", ("take", "sift", "report"))
     put(pipeline.readers.dispatch, "raw_files", toys.raw_files)
     put(pipeline.readers.dispatch, "raw_parts", toys.raw_parts)
-    repeat = importlib.import_module("stages.commands.repeat")  # not before the toys are in their places
-    put(importlib.import_module("stages.commands.run"), "say_next", lambda *_: None)  # toys have no values to enter
-    put(repeat, "WORKER", [sys.executable, __file__, REPEAT_WORKER])
+    run = importlib.import_module("stages.commands.run")  # not before the toys are in their places
+    put(run, "say_next", lambda *_: None)  # toys have no values to enter
+    if repeat:
+        worker = [sys.executable, __file__, REPEAT_WORKER]
+        put(importlib.import_module("stages.commands.repeat"), "WORKER", worker)
     return {module.__name__: module for module in (take, sift, report)}
 
 
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.default_int_handler)  # as in a terminal: a job in the background ignores it
-    sys.modules |= install(setattr)
+    sys.modules |= install(setattr, repeat=sys.argv[1] == "repeat")
     if sys.argv[1] == REPEAT_WORKER:
         from stages.commands.repeat_worker import main
     else:

@@ -4,11 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.end_to_end.conftest import right, small, undisturbed
 from tests.support.places import Told
 from tools.pictures import missing
 
-__all__ = ["right", "small", "undisturbed"]
 HERE = Path(__file__).parent
 
 
