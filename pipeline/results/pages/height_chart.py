@@ -83,17 +83,18 @@ def height_chart(
     for (sensor, name), rows in means.groupby(["sensor", "family"], sort=False):
         heights, values, sigmas = _without_gaps_closed(rows)
         values = np.clip(values, -half, half)
-        axis.errorbar(
+        line, *_ = axis.errorbar(
             values, heights, xerr=WITHIN_95 * sigmas, fmt=f"{marks[str(name)]}-", color=colours[str(name)],
-            markersize=2.5, linewidth=1.0, elinewidth=0.4, label=name, clip_on=False,
+            markersize=2.5, linewidth=1.0, elinewidth=0.4, label=name,
         )  # fmt: skip
+        line.set_clip_on(False)  # a mean on the edge is drawn in full
         at = beyond.loc[(beyond["sensor"] == sensor) & (beyond["family"].map(family_of) == name), "low"].to_numpy()
         axis.plot(np.clip(_mean_at(at, rows), -half, half), at, "o", mfc="none", mec=ALARM, ms=8, clip_on=False)
     _frame(axis, means, 1000 * tolerance_m, half)
     handles, labels = axis.get_legend_handles_labels()
     known = dict(zip(labels, handles, strict=True))
-    figure.legend([known[name] for name in names if name in known], [name for name in names if name in known],
-                  loc="center right", frameon=False)  # fmt: skip
+    shown = [name for name in names if name in known]
+    figure.legend([known[name] for name in shown], shown, loc="upper left", bbox_to_anchor=(0.84, 0.8), frameon=False)
     return picture(figure, "mean residuals by height above the water")
 
 
