@@ -42,7 +42,7 @@ def places(bottom: int = 0) -> pd.DataFrame:
 
 
 def points_on(faces: pd.DataFrame, per_m2: float = 600.0, seed: int = 1) -> pd.DataFrame:
-    """Points evenly on all faces, the laser's above the water and the sonar's below; residuals of plus or minus 2 mm."""
+    """Points evenly on all faces, the laser's above the water and the sonar's below; residuals of ± 2 mm."""
     random = np.random.default_rng(seed)
     tables = []
     for row in faces.to_dict("records"):
