@@ -143,7 +143,7 @@ def test_complete_in_itself_and_not_large(undisturbed: tuple[Path, Told]) -> Non
     assert_self_contained(page)
     assert (run / "report" / "report.html").stat().st_size < 5_000_000
     pictures = page.named("img")
-    assert len(pictures) == 7
+    assert len(pictures) == 8
     for picture in pictures:
         assert picture["alt"]
         svg = base64.b64decode(str(picture["src"]).partition(",")[2]).decode("utf-8")

@@ -79,7 +79,7 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
 
 def draw(model: TargetModel, residuals: pd.DataFrame, solved: bool = True) -> None:
     with drawing_style():
-        target_plots.target_sections(residuals, faces_of(model), solved)
+        target_plots.target_sections(residuals, faces_of(model), solved, letters=model.repeats_m is not None)
 
 
 @pytest.mark.parametrize(

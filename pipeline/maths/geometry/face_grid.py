@@ -50,17 +50,27 @@ def bin_statistics(keys: Integers, residual_m: Array, weight: Array) -> BinStati
     return BinStatistics(bins, np.bincount(inverse, minlength=size), mean, rms)
 
 
-def face_axes(normal: Array) -> Array:
-    """Return two unit vectors (2, 3) in a face, the horizontal one first.
+def lies_flat(normal: Array) -> bool:
+    """Return whether a face slopes by less than 30°, so that it is best seen from above; no bank of 1 : 1.5 does."""
+    return bool(abs(normal[2]) > np.sqrt(0.75))
 
-    For a face that slopes by less than 45°, they are the frame's x and y axes.
+
+def face_axes(normal: Array) -> Array:
+    """Return two unit vectors (2, 3) in a face: to the right as seen from in front of it, and up the face.
+
+    For a face that lies flat, they are the frame's x and y axes, or those turned into the face.
 
     >>> face_axes(np.array([-1.0, 0.0, 0.0]))
     array([[ 0., -1.,  0.],
            [ 0.,  0.,  1.]])
+    >>> face_axes(np.array([0.0, 0.0, -1.0]))
+    array([[1., 0., 0.],
+           [0., 1., 0.]])
     """
-    if abs(normal[2]) > np.sqrt(0.5):
-        return np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    if lies_flat(normal):
+        first = np.array([1.0, 0.0, 0.0]) - normal[0] * normal
+        first /= np.linalg.norm(first)
+        return np.stack([first, np.sign(normal[2]) * np.cross(normal, first)]) + 0.0
     first = np.cross([0.0, 0.0, 1.0], normal)
     first /= np.linalg.norm(first)
     return np.stack([first, np.cross(normal, first)]) + 0.0

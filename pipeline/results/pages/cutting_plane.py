@@ -1,6 +1,6 @@
 """Vertical planes that cut the target, for sections through it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -8,7 +8,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from pipeline.adjustment.residual_tables import FEWEST
+
 Array = NDArray[np.float64]
+HALF_SLICE_M = 0.04  # half the thickness of a section
 
 
 @dataclass(frozen=True)
@@ -24,14 +27,14 @@ class CuttingPlane:
         return 1 - self.axis
 
     def __str__(self) -> str:
-        return f"{'xy'[self.axis]} = {self.at:.2f} m"
+        return f"{'xy'[self.axis]} = {round(self.at, 2) + 0.0:.2f} m"
 
 
 def plane_through(corners: Sequence[Array], visible: NDArray[np.bool_]) -> CuttingPlane | None:
     """Return the vertical plane, x or y constant, that cuts most of the chosen faces; None if it would cut none.
 
     Planes midway between neighbouring coordinates of corners are tried. The best cuts the patent's target at half the
-    depth of its blocks, and a plain wall at right angles to its face.
+    depth of its blocks. Of other targets :func:`plane_by_points` shows more.
 
     Parameters
     ----------
@@ -42,8 +45,7 @@ def plane_through(corners: Sequence[Array], visible: NDArray[np.bool_]) -> Cutti
     """
     best: tuple[int, CuttingPlane] | None = None
     for axis in (0, 1):
-        ends = np.unique(np.concatenate([points[:, axis] for points in corners]))
-        for at in ((ends[1:] + ends[:-1]) / 2).tolist():
+        for at in _midway(corners, axis):
             plane = CuttingPlane(axis, at)
             number = sum(
                 bool(cut_line(points, plane)) for points, has_points in zip(corners, visible, strict=True) if has_points
@@ -51,6 +53,58 @@ def plane_through(corners: Sequence[Array], visible: NDArray[np.bool_]) -> Cutti
             if number and (best is None or number > best[0]):
                 best = number, plane
     return None if best is None else best[1]
+
+
+def plane_by_points(
+    corners: Sequence[Array], normals: Array, points_m: Mapping[str, Array], on_face: Mapping[str, Array]
+) -> CuttingPlane | None:
+    """Return the vertical plane that shows best whether walls and slopes go on below the water; None if none does.
+
+    Near the best plane both sensors have most points on the same faces, of those that it cuts at a good angle. For each
+    face the fewer of the two sensors' points count, then all points: in full on a wall that the plane cuts at right
+    angles, a quarter on one at 45° to it or on a slope of 45°, not at all on a level face. Planes midway between
+    neighbouring coordinates of corners are tried, then, if too few points lie there, those through the middle of each
+    face's points.
+
+    Parameters
+    ----------
+    corners
+        Corners (n, 3) m of each face, target frame.
+    normals
+        Their normals (n, 3).
+    points_m
+        Points (k, 3) of each sensor that has any, target frame; the calibrated sensor is the last.
+    on_face
+        The number of the face of each of them (k,).
+    """
+    calibrated, face = list(points_m.values())[-1], list(on_face.values())[-1]
+    middles = [np.median(calibrated[face == number], axis=0) for number in np.unique(face)]
+    for tried in ([_midway(corners, axis) for axis in (0, 1)], [[at[axis] for at in middles] for axis in (0, 1)]):
+        best: tuple[tuple[float, float], CuttingPlane] | None = None
+        for axis in (0, 1):
+            weight = normals[:, 1 - axis] ** 4
+            for at in map(float, tried[axis]):
+                plane = CuttingPlane(axis, at)
+                cut = np.array([bool(cut_line(points, plane)) for points in corners])
+                numbers = np.array([_near(points_m[name], on_face[name], plane, cut) for name in points_m])
+                score = float(numbers.min(axis=0) @ weight), float((numbers @ weight).sum())
+                if numbers[-1].sum() >= FEWEST and (best is None or score > best[0]):
+                    best = score, plane
+        if best is not None:
+            return best[1]
+    return None
+
+
+def _near(points_m: Array, on_face: Array, plane: CuttingPlane, cut: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Return the number of points near the plane by face, (n,), 0 for faces that it does not cut."""
+    near = np.abs(points_m[:, plane.axis] - plane.at) < HALF_SLICE_M
+    return np.asarray(np.where(cut, np.bincount(on_face[near], minlength=len(cut)), 0))
+
+
+def _midway(corners: Sequence[Array], axis: int) -> list[float]:
+    """Return the values midway between neighbouring coordinates (0: x, 1: y) of the corners."""
+    ends = np.unique(np.concatenate([points[:, axis] for points in corners]))
+    return [float(at) for at in (ends[1:] + ends[:-1]) / 2]
 
 
 def slopes_in(faces: pd.DataFrame, plane: CuttingPlane) -> Array:

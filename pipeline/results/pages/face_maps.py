@@ -1,6 +1,6 @@
-"""Maps of the mean residuals over the faces, and a plan of the passes' tracks before the target."""
+"""Maps of the mean residuals over the faces."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -8,25 +8,26 @@ import pandas as pd
 from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.offsetbox import AnnotationBbox, DrawingArea
-from matplotlib.patches import FancyArrow
-from matplotlib.text import Text
 from matplotlib.ticker import FixedLocator, MaxNLocator
 from numpy.typing import NDArray
 
 from pipeline.adjustment.residual_tables import FEWEST
-from pipeline.artefacts.from_tables import family_names, horizontal_families, is_horizontal, normal_of
-from pipeline.maths.geometry.face_grid import face_axes
-from pipeline.results.pages.rendering import INK, QUIET, SONAR, WIDTH_IN, picture
+from pipeline.artefacts.from_tables import family_names, normal_of
+from pipeline.maths.geometry.face_grid import face_axes, lies_flat
+from pipeline.results.pages.families import PIECES, shown_name, shown_names
+from pipeline.results.pages.rendering import QUIET, WIDTH_IN, picture
 from pipeline.results.pages.target_plots import MOST_PANELS, XYZ
 
 Array = NDArray[np.float64]
-MAP_HEIGHT_IN = 2.9
-ROSE_PT = 56.0  # size of the arrow to north with its letter
+LEFT_IN, RIGHT_IN, BOTTOM_IN, HIGHEST_IN = 0.65, 0.95, 0.45, 2.2  # margins and the tallest panel
+GAP_IN, TICKS_IN, TITLE_IN = 0.26, 0.5, 0.3  # between panels; before one with numbers of its own; above
+NARROWEST_IN, LOWEST_IN, FLAT_IN = 0.6, 1.1, 1.0  # panels: narrowest, lowest, width of one from above
+MERGED = (1, 2, 4)  # cells along the side of a square
+MOST_HEARD = 0.5  # least share of each family's points in squares with enough of them
 
 
 def residual_maps(residual_map: pd.DataFrame, faces: pd.DataFrame, sensor: str) -> Markup:
-    """Draw the mean residuals over each family of faces, seen from the boat; horizontal faces from above.
+    """Draw the mean residuals over each family of faces, seen from the boat; faces that lie flat from above.
 
     Parameters
     ----------
@@ -37,123 +38,179 @@ def residual_maps(residual_map: pd.DataFrame, faces: pd.DataFrame, sensor: str) 
     sensor
         ``laser`` or ``mbes``.
     """
-    figure = Figure(figsize=(WIDTH_IN, MAP_HEIGHT_IN))
-    where = {"left": 0.07, "right": 0.87, "bottom": 0.15, "top": 0.92, "wspace": 0.25}
-    level = horizontal_families(faces)
-    family = dict(zip(faces["face"], faces["family"], strict=True))
-    normal = {row["family"]: normal_of(row) for row in faces.to_dict("records")}
-    enough = (residual_map["count"] >= FEWEST) & np.isfinite(residual_map["mean_m"])
-    cells = residual_map[(residual_map["sensor"] == sensor) & enough]
-    of_family = np.array([family[face] for face in cells["face"]], dtype=object)
     every = _from_the_boat(faces)
-    order = ([name for name in every if name in set(of_family)] or every)[:MOST_PANELS]
-    widths = [_panel_width(faces, name) for name in order]
-    panels = figure.subplots(1, len(order), width_ratios=widths, gridspec_kw=where, squeeze=False)[0]
-    span = max(1.0, 1000 * float(np.quantile(np.abs(cells["mean_m"]), 0.95))) if len(cells) else 1.0
-    z = cells.loc[[name not in level for name in of_family], "z_target_m"]
-    heights = (z.min() - 0.1, z.max() + 0.1) if len(z) else (0.0, 1.0)
+    order = families_of_maps(residual_map, faces, sensor)[0] or list(every)[:MOST_PANELS]
+    cells = _placed(residual_map[residual_map["sensor"] == sensor], faces)
+    squares = _squares(cells[cells["family"].isin(order)])
+    figure, panels = _panels(order, every, squares)
+    span = max(1.0, float(np.quantile(np.abs(squares["mean_mm"]), 0.95))) if len(squares) else 1.0
     image = None
-    for axis, name in zip(panels, order, strict=True):
-        inside = cells[of_family == name]
-        flat = inside[XYZ].to_numpy(np.float64) @ face_axes(normal[name]).T
-        size = float(inside["size_m"].iloc[0]) if len(inside) else 0.1
-        image = _grid(axis, flat, 1000 * inside["mean_m"].to_numpy(), size, span) or image
-        axis.set(title=name, aspect="equal")
-        axis.set_xlabel("x, m (from above)" if name in level else "to the right, m")
-        if name not in level:
-            axis.set_ylim(*heights)
-        _few_ticks(axis)
-    panels[0].set_ylabel("z, height, m")
+    upright = [name for name in order if not every[name]]
+    for name, axis in panels.items():
+        inside = squares[squares["family"] == name]
+        image = _draw(axis, inside, span) or image
+        axis.set_title(name)
+        if every[name]:
+            axis.set_aspect("equal", adjustable="box", anchor="SW")
+            axis.set(xlabel="x, m (from above)", ylabel="y, m")
+        elif name == upright[0]:
+            axis.set_ylabel("z, height, m")
+        else:
+            axis.tick_params(labelleft=False)
+        if upright and name == upright[len(upright) // 2]:
+            axis.set_xlabel("to the right, m")
+        _few_ticks(axis, figure)
     if image is not None:
-        bar = figure.add_axes((0.9, 0.15, 0.015, 0.7))
+        bar = figure.add_axes((1 - 0.72 / WIDTH_IN, 0.2, 0.015, 0.65))
         figure.colorbar(image, cax=bar, label="mean residual, mm", extend="both")
     return picture(figure, f"maps of the {'sonar' if sensor == 'mbes' else 'laser'}'s mean residuals over the faces")
 
 
-def _few_ticks(axis: Axes) -> None:
-    """Set the ticks of a panel that is drawn to scale: no more than there is room for their numbers."""
-    spans = [abs(high - low) for low, high in (axis.get_xlim(), axis.get_ylim())]
-    box = axis.get_position(original=True)
-    room = box.width * WIDTH_IN, box.height * MAP_HEIGHT_IN
-    scale = min(inches / span for inches, span in zip(room, spans, strict=True))
-    for ticks, span, needed in zip((axis.xaxis, axis.yaxis), spans, (0.5, 0.25), strict=True):
-        number = int(span * scale / needed)
-        middle = round(float(np.mean(ticks.get_view_interval())), 1)
-        ticks.set_major_locator(MaxNLocator(min(number, 6)) if number else FixedLocator([middle]))
+def families_of_maps(residual_map: pd.DataFrame, faces: pd.DataFrame, sensor: str) -> tuple[list[str], int]:
+    """Return the families of the map of a sensor, from left to right, and the number of those left out.
+
+    Where there are too many, walls and slopes that both sensors see come first, and flat faces last.
+    """
+    every = _from_the_boat(faces)
+    family = faces["family"].map(shown_name).to_numpy()
+    seen = {}
+    for name in residual_map["sensor"].unique():
+        rows = residual_map[(residual_map["sensor"] == name) & np.isfinite(residual_map["mean_m"])]
+        counts = rows["count"].groupby(family[rows["face"].to_numpy().astype(int)]).sum()
+        seen[name] = set(counts.index[counts >= FEWEST])
+    by_both = set.intersection(*(names for names in seen.values() if names)) if any(seen.values()) else set()
+    shown = [name for name in every if name in seen.get(sensor, ())]
+    chosen = sorted(shown, key=lambda name: (every[name], name not in by_both))[:MOST_PANELS]
+    return [name for name in shown if name in chosen], len(shown) - len(chosen)
 
 
-def _from_the_boat(faces: pd.DataFrame) -> list[str]:
-    """Return the families from left to right as seen from the boat (decreasing y), and the horizontal ones last."""
-    middle = {
-        name: np.mean([np.reshape(corners, (-1, 3))[:, 1].mean() for corners in of_family["vertices_target_m"]])
-        for name, of_family in faces.groupby("family", sort=False)
-    }
-    level = horizontal_families(faces)
-    return sorted(family_names(faces), key=lambda name: (name in level, -middle[name]))
+def _from_the_boat(faces: pd.DataFrame) -> dict[str, bool]:
+    """Return for each family whether it is drawn from above: from left to right as seen from the boat, those last."""
+    shown = faces["family"].map(shown_name)
+    middle, flat = {}, {}
+    for name, of_family in faces.groupby(shown, sort=False):
+        along = [np.reshape(corners, (-1, 3))[:, 1].mean() for corners in of_family["vertices_target_m"]]
+        middle[name] = float(np.mean(along))
+        flat[name] = name == PIECES or all(lies_flat(normal_of(row)) for row in of_family.to_dict("records"))
+    names = sorted(shown_names(family_names(faces)), key=lambda name: (flat[name], -middle[name]))
+    return {name: flat[name] for name in names}
 
 
-def _panel_width(faces: pd.DataFrame, name: str) -> float:
-    """Return a panel's relative width, which follows from the width of the family's faces."""
-    outlines = faces.loc[faces["family"] == name, "vertices_target_m"]
-    x, y = np.ptp(np.concatenate([np.reshape(outline, (-1, 3)) for outline in outlines]), axis=0)[:2]
-    return float(np.clip((x if name in horizontal_families(faces) else np.hypot(x, y)) / 1.5, 0.8, 2.0))
+def _placed(cells: pd.DataFrame, faces: pd.DataFrame) -> pd.DataFrame:
+    """Return the cells with a mean: family, right, up, wide, high (m), count, mean_m.
+
+    ``right`` and ``up`` are as seen from the boat or from above. Seen from the boat, ``up`` is the height, so that the
+    cells of a slope are lower than they are wide.
+    """
+    tables, every = [], _from_the_boat(faces)
+    normals = {int(row["face"]): normal_of(row) for row in faces.to_dict("records")}
+    family = dict(zip(faces["face"], faces["family"].map(shown_name), strict=True))
+    for face, rows in cells[np.isfinite(cells["mean_m"])].groupby("face", sort=True):
+        name, normal = family[face], normals[int(str(face))]
+        points, size = rows[XYZ].to_numpy(np.float64), rows["size_m"].to_numpy(np.float64)
+        right = points[:, 0] if every[name] else points @ face_axes(normal)[0]
+        up, high = (points[:, 1], size) if every[name] else (points[:, 2], size * np.hypot(normal[0], normal[1]))
+        values = {"family": name, "right": right, "up": up, "wide": size, "high": high}
+        tables.append(pd.DataFrame(values | {key: rows[key].to_numpy() for key in ("count", "mean_m")}))
+    names = ["family", "right", "up", "wide", "high", "count", "mean_m"]
+    return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=names)
 
 
-def _grid(axis: Axes, centres: Array, values: Array, size: float, span: float) -> Any:
-    """Draw a square at each centre; for several squares at one place (horizontal faces of blocks), draw their mean."""
-    x, y = centres[:, 0], centres[:, 1]
-    if not len(x):
+def _squares(cells: pd.DataFrame) -> pd.DataFrame:
+    """Return the means (mm) of squares of cells with enough points: family, column, row, right, up, wide, high.
+
+    A square has as few cells as will do for half of each family's points; cells at one place (the tops of blocks) are
+    one. ``right`` and ``up`` are the place of the square's middle.
+    """
+    if not len(cells):
+        return cells.assign(column=0, row=0, mean_mm=0.0)
+    start = cells.groupby("family")[["right", "up", "wide", "high"]].transform("min")
+    column = np.rint((cells["right"] - start["right"]) / start["wide"]).astype(int)
+    row = np.rint((cells["up"] - start["up"]) / start["high"]).astype(int)
+    for many in MERGED:
+        keyed = start.assign(family=cells["family"], column=column // many, row=row // many, count=cells["count"])
+        keyed["total_mm"] = 1000 * cells["mean_m"] * cells["count"]
+        sums = keyed.groupby(["family", "column", "row"], as_index=False, sort=True).agg(
+            {"right": "min", "up": "min", "wide": "min", "high": "min", "count": "sum", "total_mm": "sum"}
+        )
+        enough = sums["count"] >= FEWEST
+        shares = sums["count"].where(enough, 0).groupby(sums["family"]).sum() / sums.groupby("family")["count"].sum()
+        if shares.min() >= MOST_HEARD:
+            break
+    squares = sums[enough].assign(mean_mm=sums["total_mm"] / sums["count"])
+    for at, number, side in (("right", "column", "wide"), ("up", "row", "high")):
+        squares[at] += squares[side] * (many * squares[number] + (many - 1) / 2)
+        squares[side] *= many
+    return squares
+
+
+def _ends(squares: pd.DataFrame, at: str, margin: float) -> tuple[float, float]:
+    """Return the limits of an axis (``right`` or ``up``) round these squares, m; 0 and 1 without any."""
+    if not len(squares):
+        return 0.0, 1.0
+    half = squares["wide" if at == "right" else "high"] / 2
+    return float((squares[at] - half).min() - margin), float((squares[at] + half).max() + margin)
+
+
+def _panels(order: Sequence[str], flat: Mapping[str, bool], squares: pd.DataFrame) -> tuple[Figure, dict[str, Axes]]:
+    """Return a figure with a panel for each family: upright ones at one scale with one axis of heights, then flat ones.
+
+    What would be too low at this scale is drawn higher; what would be too narrow gets room beside it.
+    """
+    own = {name: squares[squares["family"] == name] for name in order}
+    ends = {name: _ends(own[name], "right", 0.05) for name in order}
+    upright = [name for name in order if not flat[name]]
+    heights = _ends(squares[squares["family"].isin(upright)], "up", 0.1)
+    gaps = sum(TICKS_IN if flat[name] else GAP_IN for name in order[1:])
+    room = WIDTH_IN - LEFT_IN - RIGHT_IN - gaps - FLAT_IN * (len(order) - len(upright))
+    narrowest = min(NARROWEST_IN, 0.8 * room / max(1, len(upright)))
+    widths = np.array([ends[name][1] - ends[name][0] for name in upright])
+    scale = HIGHEST_IN / (heights[1] - heights[0])  # inches for a metre
+    while np.maximum(scale * widths, narrowest).sum() > room:
+        scale *= 0.98
+    height = float(np.clip(scale * (heights[1] - heights[0]), LOWEST_IN, HIGHEST_IN))
+    tallest = height if len(upright) == len(order) else HIGHEST_IN
+    high = BOTTOM_IN + tallest + TITLE_IN
+    figure = Figure(figsize=(WIDTH_IN, high))
+    panels: dict[str, Axes] = {}
+    left = LEFT_IN
+    for name in order:
+        left += 0.0 if not panels else TICKS_IN if flat[name] else GAP_IN
+        low, most = ends[name]
+        width = FLAT_IN if flat[name] else max(scale * (most - low), narrowest)
+        place = left / WIDTH_IN, BOTTOM_IN / high, width / WIDTH_IN, (tallest if flat[name] else height) / high
+        panels[name] = figure.add_axes(place)
+        beside = 0.0 if flat[name] else (width / scale - (most - low)) / 2
+        up = _ends(own[name], "up", 0.05) if flat[name] else heights
+        panels[name].set(xlim=(low - beside, most + beside), ylim=up)
+        left += width
+    return figure, panels
+
+
+def _draw(axis: Axes, squares: pd.DataFrame, span: float) -> Any:
+    """Draw the squares of a family in colour; return the image, None without squares."""
+    if not len(squares):
         axis.text(0.5, 0.5, "no points", transform=axis.transAxes, ha="center", color=QUIET)
         return None
-    column, row = (np.round((at - at.min()) / size).astype(int) for at in (x, y))
-    total, count = (np.zeros((row.max() + 1, column.max() + 1)) for _ in range(2))
-    np.add.at(total, (row, column), values)
-    np.add.at(count, (row, column), 1)
-    with np.errstate(invalid="ignore"):
-        mean = total / count
-    edges = (x.min() - size / 2, x.max() + size / 2, y.min() - size / 2, y.max() + size / 2)
-    return axis.imshow(mean, origin="lower", extent=edges, cmap="RdBu_r", vmin=-span, vmax=span, interpolation="none")
-
-
-def pass_tracks(positions_m: Mapping[int, Array], faces: pd.DataFrame, azimuth_deg: float) -> Markup:
-    """Draw the passes' tracks before the target from above, with an arrow to north.
-
-    Parameters
-    ----------
-    positions_m
-        The positions of the INS by pass, target frame, (n, 3).
-    faces
-        The artefact ``faces``.
-    azimuth_deg
-        The azimuth of the target.
-    """
-    figure = Figure(figsize=(WIDTH_IN, 3.6))
-    axis = figure.add_axes((0.08, 0.14, 0.78, 0.77))
-    for corners in faces.loc[~is_horizontal(faces), "vertices_target_m"]:
-        points = np.reshape(corners, (-1, 3))
-        axis.plot(points[:, 1], points[:, 0], color=INK, linewidth=1.2)
-    for number, track in positions_m.items():
-        axis.plot(track[:, 1], track[:, 0], color=SONAR, linewidth=0.9)
-        axis.annotate(f"{number}", (track[-1, 1], track[-1, 0]), (4, 0), textcoords="offset points", va="center")
-        axis.plot(*track[0, [1, 0]], ".", color=SONAR, markersize=4)
-    _point_north(axis, azimuth_deg)
-    axis.set(xlabel="y, along the target, m", ylabel="x, into it, m", aspect="equal")
-    axis.set_title("tracks of the passes (dot: start) and the target, from above")
-    axis.invert_yaxis()  # seen from above with y to the right, x runs down
-    axis.margins(0.08)
-    return picture(figure, "plan of the passes before the target")
-
-
-def _point_north(axis: Axes, azimuth_deg: float) -> None:
-    """Draw an arrow to north beside the right edge of a plan with y to the right and x down."""
-    half = ROSE_PT / 2
-    along, up = np.cos(np.radians(azimuth_deg)), np.sin(np.radians(azimuth_deg))  # components of north to right and up
-    box = DrawingArea(ROSE_PT, ROSE_PT)
-    tail, length = 0.7 * half, 1.1 * half
-    shape: dict[str, Any] = {"width": 0.6, "head_width": 5.0, "color": QUIET, "length_includes_head": True}
-    box.add_artist(FancyArrow(half - tail * along, half - tail * up, length * along, length * up, **shape))
-    place: dict[str, Any] = {"ha": "center", "va": "center"}
-    box.add_artist(Text(half + 0.75 * half * along, half + 0.75 * half * up, "N", **place))
-    axis.add_artist(
-        AnnotationBbox(box, (1.0, 0.5), xycoords=axis.transAxes, box_alignment=(0.0, 0.5), frameon=False, pad=0.0)
+    column, row = (squares[name].to_numpy() - squares[name].min() for name in ("column", "row"))
+    mean = np.full((row.max() + 1, column.max() + 1), np.nan)
+    mean[row, column] = squares["mean_mm"]
+    edges = (*_ends(squares, "right", 0.0), *_ends(squares, "up", 0.0))
+    limits = axis.get_xlim(), axis.get_ylim()
+    image = axis.imshow(
+        mean, origin="lower", extent=edges, cmap="RdBu_r", vmin=-span, vmax=span, interpolation="none", aspect="auto"
     )
+    axis.set(xlim=limits[0], ylim=limits[1])
+    return image
+
+
+def _few_ticks(axis: Axes, figure: Figure) -> None:
+    """Set the ticks of a panel: no more than there is room for their numbers."""
+    axis.apply_aspect()
+    box = axis.get_position()
+    rooms = np.array([box.width, box.height]) * figure.get_size_inches()
+    for ticks, room, needed in zip((axis.xaxis, axis.yaxis), rooms, (0.5, 0.25), strict=True):
+        number = int(room / needed)
+        middle = round(float(np.mean(ticks.get_view_interval())), 1)
+        few = MaxNLocator(min(number, 6), steps=[1, 2, 5, 10], min_n_ticks=1) if number else FixedLocator([middle])
+        ticks.set_major_locator(few)

@@ -10,14 +10,16 @@ from numpy.typing import NDArray
 
 from pipeline.artefacts.catalogue.patent import ALTERNATION, ITERATIONS
 from pipeline.artefacts.catalogue.points import PASSES, POOL_FRAME, POSES
-from pipeline.artefacts.catalogue.results import CELLS, RESIDUAL_BINS, RESIDUAL_MAP, RESIDUALS
+from pipeline.artefacts.catalogue.results import ADJUST_SUMMARY, CELLS, PATTERNS, RESIDUAL_BINS, RESIDUAL_MAP, RESIDUALS
 from pipeline.artefacts.catalogue.target import FACES, TARGET_POSE
 from pipeline.artefacts.from_tables import family_names, trajectory_in_target
+from pipeline.config.target import Letters
 from pipeline.maths.geometry.passes import pass_of
-from pipeline.results.pages import face_maps, residual_plots, target_plots
+from pipeline.results.pages import face_maps, height_chart, residual_plots, target_plots, track_plan
 from pipeline.results.pages.rendering import drawing_style
 from pipeline.run.results import Tables, calibration
 from pipeline.run.settings import read_settings
+from pipeline.target.design import target_of
 
 TRACK_POINTS = 300  # a long pass has one to two times this number in the plan
 
@@ -34,6 +36,14 @@ def _residuals(tables: Tables) -> Markup:
     return residual_plots.residual_charts(tables.table(RESIDUAL_BINS), tables.table(CELLS), passes, families)
 
 
+def _heights(tables: Tables) -> Markup:
+    pool, faces = read_settings(tables.run).pool, tables.table(FACES)
+    residuals = tables.table(RESIDUALS, *height_chart.HEIGHTS)
+    means = height_chart.means_by_height(residuals, faces, target_of(pool.target).water_level_m)
+    limit = float(tables.table(ADJUST_SUMMARY)["test_limit"].iloc[0])
+    return height_chart.height_chart(means, tables.table(PATTERNS), faces, pool.adjust.test_tolerance_m, limit)
+
+
 def _distances(tables: Tables) -> Markup:
     residuals = tables.table(RESIDUALS, *target_plots.DISTANCES)
     faces = tables.table(FACES)
@@ -42,7 +52,8 @@ def _distances(tables: Tables) -> Markup:
 
 def _sections(tables: Tables) -> Markup:
     residuals = tables.table(RESIDUALS, *target_plots.SECTIONS)
-    return target_plots.target_sections(residuals, tables.table(FACES), _solved(tables))
+    letters = isinstance(read_settings(tables.run).pool.target, Letters)
+    return target_plots.target_sections(residuals, tables.table(FACES), _solved(tables), letters)
 
 
 def _map_laser(tables: Tables) -> Markup:
@@ -68,7 +79,7 @@ def _tracks(tables: Tables) -> Markup:
         if len(track):
             positions_m[int(pass_number)] = track[:: max(1, len(track) // TRACK_POINTS)]
     azimuth_deg = tables.table(POOL_FRAME)["azimuth_deg"].iloc[0] + pose["azimuth_correction_deg"].iloc[0]
-    return face_maps.pass_tracks(positions_m, tables.table(FACES), float(azimuth_deg))
+    return track_plan.pass_tracks(positions_m, tables.table(FACES), float(azimuth_deg))
 
 
 def _family(residuals: pd.DataFrame, tables: Tables) -> NDArray[Any]:
@@ -91,6 +102,7 @@ def picture_names(run: Path) -> list[str]:
 
 PICTURES = {  # the pictures that take longest come first
     "residuals": _residuals,
+    "heights": _heights,
     "distances": _distances,
     "sections": _sections,
     "map_mbes": _map_mbes,

@@ -23,20 +23,25 @@ from pipeline.artefacts.catalogue.results import (
     ESTIMATE,
     FREED,
     GROUPS,
+    RESIDUAL_MAP,
 )
+from pipeline.artefacts.catalogue.target import FACES
 from pipeline.artefacts.counts import sensor_of
+from pipeline.artefacts.from_tables import family_names
 from pipeline.atomic_files import write_text
 from pipeline.config.changes import changed_settings
 from pipeline.config.target import Letters
 from pipeline.gps_time import utc_text
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.maths.target.family_words import families_in_words
-from pipeline.report.as_built import design_shape
+from pipeline.report.as_built import design_shape, reference_family
 from pipeline.report.reason_codes import verdict_of
 from pipeline.report.sigma_sources import contributions, laser_correlates
 from pipeline.results.pages.certificate import certificate_values, value_rows
 from pipeline.results.pages.currency import page_digest
 from pipeline.results.pages.drift_words import drift_rows, drift_sentence
+from pipeline.results.pages.face_maps import families_of_maps
+from pipeline.results.pages.families import PIECES, shown_names
 from pipeline.results.pages.instrument_table import instrument_rows
 from pipeline.results.pages.limiting_errors import limiting_sentences
 from pipeline.results.pages.mount_tables import METHODS, correlation_rows, method_rows, parameter_rows, part_rows
@@ -141,6 +146,7 @@ def _result_values(
         "configured_speed": None if laser else settings.session.sonar.sound_speed_m_s,
         "speeds": _speeds(tables.table(FILES)),
         "letters": isinstance(settings.pool.target, Letters),
+        "found": target_of(settings.pool.target).found,
         "solved_methods": [method for method in methods if result["methods"][method]["mount"]],
         "patent_check": "" if laser else patent_check(result["methods"]),
         "faces_in_words": families_in_words(target_of(settings.pool.target)),
@@ -157,7 +163,13 @@ def _result_values(
 def _residual_values(tables: Tables, result: Row, settings: Settings) -> Row:
     """Return the template's values about the residuals."""
     codes = [*result["reason_codes"], *result["warning_codes"]]
+    faces, cells = tables.table(FACES), tables.table(RESIDUAL_MAP)
+    families = family_names(faces)
     return {
+        "example": reference_family(families),
+        "kinds": ", ".join([*families[:2], *("…" for _ in families[2:3])]),
+        "pieces": PIECES in shown_names(families) and PIECES not in families,
+        "not_shown": {sensor: families_of_maps(cells, faces, sensor)[1] for sensor in ("laser", "mbes")},
         "largest": _largest(tables.table(CELLS)),
         "tolerated": f"{1000 * settings.pool.adjust.test_tolerance_m:g}",
         "level": f"{100 * settings.pool.adjust.test_level:g}",

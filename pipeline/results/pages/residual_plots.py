@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from pipeline.adjustment.residual_tables import FEWEST
 from pipeline.gps_time import NS
 from pipeline.mount import WITHIN_95
-from pipeline.results.pages.families import styles_of_families
+from pipeline.results.pages.families import shown_names, styles_of_families, together
 from pipeline.results.pages.rendering import AXIS, FAMILY, LASER, MARKS, QUIET, SMALLEST_PT, SONAR, WIDTH_IN, picture
 
 WORDS = {"angle": "swath angle", "range": "distance"}
@@ -21,6 +21,8 @@ LABELS = {"angle": "angle across track in the {}'s frame, degrees", "range": "di
 
 def residual_charts(bins: pd.DataFrame, cells: pd.DataFrame, passes: pd.DataFrame, families: Sequence[str]) -> Markup:
     """Draw mean residuals of the calibrated sensor by angle and distance, of both sensors by family and over time.
+
+    Pieces of the bottom are one family.
 
     Parameters
     ----------
@@ -33,7 +35,9 @@ def residual_charts(bins: pd.DataFrame, cells: pd.DataFrame, passes: pd.DataFram
     families
         Names of the target's families.
     """
-    colours, marks = styles_of_families(families, FAMILY), styles_of_families(families, MARKS)
+    names = shown_names(families)
+    colours, marks = styles_of_families(names, FAMILY), styles_of_families(names, MARKS, turn=1)
+    bins, cells = together(bins, ("sensor", "pass", "by", "low", "width")), together(cells, ("sensor", "pass"))
     figure = Figure(figsize=(WIDTH_IN, 6.0))
     grid = figure.add_gridspec(3, 2, left=0.08, right=0.98, bottom=0.05, top=0.91, wspace=0.2, hspace=0.55)
     by_face, by_angle, by_range = (figure.add_subplot(grid[place]) for place in ((0, 0), (0, 1), (1, 0)))

@@ -12,13 +12,20 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from pipeline.adjustment.residual_tables import FEWEST
-from pipeline.artefacts.from_tables import family_names, horizontal_families, is_horizontal
-from pipeline.results.pages.cutting_plane import CuttingPlane, cut_line, plane_through, slopes_in
+from pipeline.artefacts.from_tables import family_names, horizontal_families, is_horizontal, normals_of
+from pipeline.results.pages.cutting_plane import (
+    HALF_SLICE_M,
+    CuttingPlane,
+    cut_line,
+    plane_by_points,
+    plane_through,
+    slopes_in,
+)
+from pipeline.results.pages.families import PIECES, shown_name
 from pipeline.results.pages.rendering import COARSE, INK, LASER, SONAR, WIDTH_IN, picture
 
 Array = NDArray[np.float64]
 MOST_PANELS = 7  # most families in one picture
-HALF_SLICE_M = 0.04  # half the thickness of a section
 ASIDE_M = 0.3  # a point farther than this from a face belongs to another face
 DOTS = 6000  # most points of a cloud in one panel
 XYZ = [f"{axis}_target_m" for axis in "xyz"]
@@ -35,7 +42,7 @@ CLOUDS: Mapping[str, tuple[Cloud, ...]] = {  # by the calibrated sensor, in the 
 }
 
 
-def target_sections(residuals: pd.DataFrame, faces: pd.DataFrame, solved: bool) -> Markup:
+def target_sections(residuals: pd.DataFrame, faces: pd.DataFrame, solved: bool, letters: bool) -> Markup:
     """Draw the target from above, a section through it to scale, and an enlarged part of the section.
 
     If no vertical plane cuts a face with points, only the view from above is drawn.
@@ -48,24 +55,26 @@ def target_sections(residuals: pd.DataFrame, faces: pd.DataFrame, solved: bool) 
         The artefact ``faces``.
     solved
         Whether the adjustment has a result to show.
+    letters
+        Whether the target is the patent's, whose shape tells where to cut it; else the points do.
     """
     corners = [np.reshape(outline, (-1, 3)) for outline in faces["vertices_target_m"]]
     level = is_horizontal(faces)
+    from_above = ~level | (faces["family"].map(shown_name) == PIECES).to_numpy()
     face = residuals["face"].to_numpy().astype(int)
     calibrated = _calibrated(residuals)
     of_sensor = {sensor: (residuals["sensor"] == sensor).to_numpy() for sensor in ("laser", "mbes")}
-    seen = np.bincount(face[of_sensor[calibrated]], minlength=len(faces)) >= FEWEST
-    plane = plane_through(corners, ~level & seen)
+    plane = _plane(residuals, faces, of_sensor, calibrated, letters)
     cut = np.array([plane is not None and bool(cut_line(points, plane)) for points in corners])
     slope = np.zeros(len(faces)) if plane is None else slopes_in(faces, plane)
     figure = Figure(figsize=(WIDTH_IN, 3.8))
-    where = {"left": 0.08, "right": 0.98, "bottom": 0.19, "top": 0.93, "wspace": 0.3}
+    where = {"left": 0.08 if letters else 0.105, "right": 0.98, "bottom": 0.19, "top": 0.93, "wspace": 0.3}
     widths = [1.0, 2.6, 2.6] if plane is not None else [1.0]
     above, *others = figure.subplots(1, len(widths), width_ratios=widths, gridspec_kw=where, squeeze=False)[0]
     nearest: list[Array] = []
     for sensor, prefix, label, colour in CLOUDS[calibrated][: None if solved else -1]:  # the last is the calibrated one
         columns = [prefix + name for name in XYZ]
-        cloud = residuals.loc[of_sensor[sensor] & ~level[face], columns].to_numpy()
+        cloud = residuals.loc[of_sensor[sensor] & from_above[face], columns].to_numpy()
         _dots(above, cloud[:, :2], colour, label)
         if plane is None:
             continue
@@ -91,6 +100,27 @@ def target_sections(residuals: pd.DataFrame, faces: pd.DataFrame, solved: bool) 
         axis.xaxis.set_major_locator(MaxNLocator(3 if axis is above else 6))
     _legend(figure, above)
     return picture(figure, "sections through the target with points of laser and sonar, coarse and calibrated")
+
+
+def _plane(
+    residuals: pd.DataFrame,
+    faces: pd.DataFrame,
+    of_sensor: Mapping[str, NDArray[np.bool_]],
+    calibrated: str,
+    letters: bool,
+) -> CuttingPlane | None:
+    """Return the plane of the section: of the patent's target by its faces, of others by the points of both sensors."""
+    corners = [np.reshape(outline, (-1, 3)) for outline in faces["vertices_target_m"]]
+    level, face = is_horizontal(faces), residuals["face"].to_numpy().astype(int)
+    if letters:
+        seen = np.bincount(face[of_sensor[calibrated]], minlength=len(faces)) >= FEWEST
+        return plane_through(corners, ~level & seen)
+    use = {name: mask & ~level[face] for name, mask in of_sensor.items()}
+    of_face = {name: face[mask] for name, mask in use.items() if mask.any()}
+    if calibrated not in of_face:
+        return None
+    points_m = {name: residuals.loc[use[name], XYZ].to_numpy(np.float64) for name in of_face}
+    return plane_by_points(corners, normals_of(faces), points_m, of_face)
 
 
 def _section(

@@ -12,6 +12,7 @@ from pipeline.maths.geometry.rotations import mount_partials
 
 HALF = np.sqrt(0.5)
 NORMALS = [(-1.0, 0.0, 0.0), (-HALF, -HALF, 0.0), (-HALF, HALF, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)]
+SLOPES = [(-0.6, 0.0, 0.8), (-0.28, 0.0, 0.96), (0.28 * HALF, 0.28 * HALF, -0.96), (-0.7, np.sqrt(0.02), np.sqrt(0.49))]
 
 
 @given(st.integers(0, 200), st.integers(1, 3), st.integers(0, 2**32 - 1))
@@ -33,7 +34,7 @@ def test_bins_against_a_loop(n: int, width: int, seed: int) -> None:
             assert rms == pytest.approx(np.sqrt(np.average(residual[use] ** 2, weights=weight[use])), abs=1e-12)
 
 
-@pytest.mark.parametrize("normal", NORMALS)
+@pytest.mark.parametrize("normal", NORMALS + SLOPES)
 def test_cells_lie_on_their_face_round_their_points(normal: tuple[float, float, float]) -> None:
     n, distance = np.array(normal), 0.7
     axes = face_axes(n)
@@ -50,6 +51,15 @@ def test_cells_lie_on_their_face_round_their_points(normal: tuple[float, float, 
 def test_the_first_axis_of_a_vertical_face_runs_to_the_right_seen_from_the_boat() -> None:
     """The boat looks along +x with z up, so -y is to its right."""
     np.testing.assert_allclose(face_axes(np.array([-1.0, 0.0, 0.0])), [[0, -1, 0], [0, 0, 1]], atol=1e-12)
+
+
+@pytest.mark.parametrize(("slope_deg", "expected"), [(29.9, [[0.8669, 0, 0.4985], [0, 1, 0]]),
+                                                     (30.1, [[0, -1, 0], [0.8652, 0, 0.5015]]),
+                                                     (45.0, [[0, -1, 0], [HALF, 0, HALF]])])
+def test_banks_are_seen_from_the_boat_and_flat_faces_from_above(slope_deg: float, expected: list[list[float]]) -> None:
+    """Two banks built at 45°, one a little steeper, must not be drawn in two ways."""
+    slope = np.radians(slope_deg)
+    np.testing.assert_allclose(face_axes(np.array([-np.sin(slope), 0.0, np.cos(slope)])), expected, atol=1e-4)
 
 
 @given(st.floats(1e-9, np.pi), st.integers(0, 2**32 - 1))
