@@ -119,37 +119,55 @@ def content_of(run: Path) -> dict[str, Any]:
     return content
 
 
+def spoilt(runs: Path, contents: list[Any]) -> None:
+    """Beside the six runs one more for each of these contents of its calibration.json; text is written as it is."""
+    for number, content in enumerate(contents):
+        run = runs / f"spoilt_{number}"
+        shutil.copytree(runs / "moved", run)
+        text = content if isinstance(content, str) else json.dumps(content)
+        (run / "report" / "calibration.json").write_text(text, encoding="utf-8")
+
+
+STARTS = ("=1+$x_{$", "2026-05-04", "2026-13-04T08:00:00Z", "", 3, None, "x" * 10_000)
+
+
 @pytest.mark.usefixtures("unpainted")
-@pytest.mark.parametrize("start", ["=1+$x_{$", "2026-05-04", "2026-13-04T08:00:00Z", "", 3, None, "x" * 10_000])
-def test_a_start_that_is_no_time_leaves_its_run_out(runs: Path, start: object) -> None:
+def test_a_start_that_is_no_time_leaves_its_run_out(runs: Path) -> None:
     """It would be a formula in the table, and mathematics in the chart."""
-    content = content_of(runs / "moved")
-    content["passes"][0]["start_utc"] = start
-    (runs / "moved" / "report" / "calibration.json").write_text(json.dumps(content), encoding="utf-8")
+    contents = [content_of(runs / "moved") for _ in STARTS]
+    for content, start in zip(contents, STARTS, strict=True):
+        content["passes"][0]["start_utc"] = start
+    spoilt(runs, contents)
     told = poolcal("history", runs)
     assert told.status == 0
-    assert f"left out: {runs / 'moved'}: its calibration.json is not as poolcal writes it" in told.err
-    assert table_of(runs)["run"].tolist() == ["b_first", "a_second", "refused", "after", "nothing"]
+    for number in range(len(STARTS)):
+        why = "its calibration.json is not as poolcal writes it"
+        assert f"left out: {runs / f'spoilt_{number}'}: {why}" in told.err, STARTS[number]
+    assert table_of(runs)["run"].tolist() == ["b_first", "a_second", "refused", "moved", "after", "nothing"]
 
 
 @pytest.mark.usefixtures("unpainted")
-@pytest.mark.parametrize("value", ["[" * 100_000, '{"verdict": "accepted", "methods": [1]}'])
-def test_one_crafted_run_does_not_stop_the_others(runs: Path, value: str) -> None:
-    (runs / "moved" / "report" / "calibration.json").write_text(value)
+def test_crafted_runs_do_not_stop_the_others(runs: Path) -> None:
+    spoilt(runs, ["[" * 100_000, '{"verdict": "accepted", "methods": [1]}'])
     told = poolcal("history", runs)
     assert told.status == 0
-    assert told.err.startswith(f"left out: {runs / 'moved'}")
-    assert len(table_of(runs)) == 5
+    for number, line in enumerate(told.err.splitlines()):
+        assert line.startswith(f"left out: {runs / f'spoilt_{number}'}")
+    assert told.err.count("\n") == 2
+    assert len(table_of(runs)) == 6
 
 
 @pytest.mark.usefixtures("unpainted")
-@pytest.mark.parametrize("value", [10**400, "1e400", "inf"])
-def test_numbers_beyond_all_bounds_are_left_out(runs: Path, value: object) -> None:
-    content = content_of(runs / "moved")
-    content["methods"]["adjustment"]["mount"]["roll_deg"] = value
-    (runs / "moved" / "report" / "calibration.json").write_text(json.dumps(content), encoding="utf-8")
-    assert f"left out: {runs / 'moved'}" in poolcal("history", runs).err
-    assert len(table_of(runs)) == 5
+def test_numbers_beyond_all_bounds_are_left_out(runs: Path) -> None:
+    values = (10**400, "1e400", "inf")
+    contents = [content_of(runs / "moved") for _ in values]
+    for content, value in zip(contents, values, strict=True):
+        content["methods"]["adjustment"]["mount"]["roll_deg"] = value
+    spoilt(runs, contents)
+    said = poolcal("history", runs).err
+    for number in range(len(values)):
+        assert f"left out: {runs / f'spoilt_{number}'}" in said
+    assert len(table_of(runs)) == 6
 
 
 @pytest.mark.usefixtures("unpainted")

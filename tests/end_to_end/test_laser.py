@@ -1,6 +1,7 @@
 """The laser's own calibration by the command line: its run folder, session.yaml, page and recordings."""
 
 import json
+import shutil
 from pathlib import Path
 
 import laspy
@@ -42,6 +43,23 @@ def calibrate(place: Place, *more: object) -> Told:
     return poolcal(*words, *pictures, *more)
 
 
+@pytest.fixture(scope="module")
+def looked_at(template: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The run folder of a calibration that wrote nothing into the session. Nobody changes it."""
+    place = Place(template, tmp_path_factory.mktemp("looked_at"))
+    place.mend()
+    place.edit_config("laser_fit", **SURVEYED)
+    assert calibrate(place, "--no-write").status == 0
+    assert (place.session / "session.yaml").read_bytes() == (template / "session.yaml").read_bytes()
+    return place.run
+
+
+@pytest.fixture
+def done(laser: Place, looked_at: Path) -> Place:
+    shutil.copytree(looked_at, laser.run)
+    return laser
+
+
 def mount(place: Place) -> dict[str, float]:
     return load_session(place.session).laser.mount.model_dump()
 
@@ -81,16 +99,15 @@ def test_the_mount_found_goes_into_the_session_and_from_there_into_the_sonars_to
         assert total[k, k] - random[k, k] >= 0.8 * laser_alone[k, k]
 
 
-def test_its_mount_and_points_go_to_other_programs(laser: Place) -> None:
+def test_its_mount_and_points_go_to_other_programs(done: Place) -> None:
     """The mount found, not the coarse one of the settings, in every form that takes a laser; and its points alone."""
-    assert calibrate(laser, "--no-write").status == 0
-    block = json.loads((laser.run / "report" / "calibration.json").read_text())["laser"]
+    block = json.loads((done.run / "report" / "calibration.json").read_text())["laser"]
     found = np.reshape(block["R_body_from_laser"], (3, 3)), np.array(block["lever_arm_m"])
-    coarse = mount(laser)
+    coarse = mount(done)
     assert abs(block["mount"]["roll_deg"] - coarse["roll_deg"]) > 0.01  # else nothing is told apart
     for name, target in TARGETS.items():
-        file = laser.folder / f"激光 {name}{target.suffix}"
-        told = poolcal("export", laser.run, "--to", name, "--out", file)
+        file = done.folder / f"激光 {name}{target.suffix}"
+        told = poolcal("export", done.run, "--to", name, "--out", file)
         if target.sensor == "mbes":
             assert (told.status, file.exists()) == (2, False)
             assert "calibrates the laser alone, and holds no sonar" in told.err
@@ -102,30 +119,31 @@ def test_its_mount_and_points_go_to_other_programs(laser: Place) -> None:
         R, position = READERS[name](file.read_text("utf-8"), "YPR")
         np.testing.assert_allclose(R, found[0], atol=3e-6)
         np.testing.assert_allclose(position, found[1], atol=6e-5)
-        told = poolcal("mount", file, "--from", name, "--session", laser.session, "--sensor", "laser")
+        told = poolcal("mount", file, "--from", name, "--session", done.session, "--sensor", "laser")
         assert told.status == 0, told.err
-        for key, value in mount(laser).items():
+        for key, value in mount(done).items():
             assert value == pytest.approx(block["mount"][key], abs=6e-5), (name, key)
     for suffix in ("las", "laz"):
-        file = laser.folder / f"cloud.{suffix}"
-        assert poolcal("export", laser.run, "--to", suffix, "--out", file).status == 0
+        file = done.folder / f"cloud.{suffix}"
+        assert poolcal("export", done.run, "--to", suffix, "--out", file).status == 0
         cloud = laspy.read(file)
-        rows = pd.read_parquet(laser.run / "adjust" / "residuals.parquet")
+        rows = pd.read_parquet(done.run / "adjust" / "residuals.parquet")
         assert len(cloud.points) >= len(rows) > 1000
         assert set(np.unique(cloud.user_data)) == {1}
         rms = float(np.sqrt(np.mean(np.square(cloud["residual_mm"]))))
         assert rms == pytest.approx(1e3 * float(np.sqrt(np.mean(np.square(rows["residual_m"])))), abs=0.2)
 
 
-def test_nothing_is_written_where_it_is_only_looked_at_or_rejected(laser: Place) -> None:
-    before = (laser.session / "session.yaml").read_bytes()
-    assert calibrate(laser, "--no-write").status == 0
-    laser.edit_config("verdict", max_sigma_deg=1e-6, max_sigma_m=1e-7)
-    told = calibrate(laser)
+def test_nothing_is_written_where_it_is_only_looked_at_or_rejected(done: Place) -> None:
+    before = (done.session / "session.yaml").read_bytes()
+    told = calibrate(done, "--no-write")
+    assert (told.status, told.err.count(": up to date")) == (0, len(STAGES))
+    done.edit_config("verdict", max_sigma_deg=1e-6, max_sigma_m=1e-7)
+    told = calibrate(done)
     assert told.status == 1
     assert "no mount parameter is good enough" in told.out
-    assert (laser.session / "session.yaml").read_bytes() == before
-    assert not (laser.session / "session.1.yaml").exists()
+    assert (done.session / "session.yaml").read_bytes() == before
+    assert not (done.session / "session.1.yaml").exists()
 
 
 def test_without_a_sonar_and_a_run_folder_of_its_own(laser: Place) -> None:
