@@ -69,7 +69,7 @@ def test_processes_of_their_own_draw_the_same(done: Place, right: dict[str, str]
     assert drawn_in(done.run) == sorted(ORDER)
     one, other = (re.findall("<img .*?>", (run / "report" / "report.html").read_text()) for run in (done.run, drawn))
     assert one == other
-    assert len(one) == 7
+    assert len(one) == 8
     assert digests(done.run) == right
     here, there = (read(run, "adjust")["/after/P2"] for run in (done.run, drawn))
     np.testing.assert_array_equal(points(here), points(there))

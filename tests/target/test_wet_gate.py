@@ -20,8 +20,8 @@ def mount(gate_m: float = 0.05, scale_m: float = SCALE_M) -> ProvisionalMount:
     )  # fmt: skip
 
 
-def as_built(offset_m: float, angle_deg: float) -> FacesAsBuilt:
-    return FacesAsBuilt(faces={}, offset_sigma_m=offset_m, angle_sigma_deg=angle_deg)
+def as_built(offset_m: float, angle_deg: float, growth_m: float = 0.0) -> FacesAsBuilt:
+    return FacesAsBuilt(faces={}, offset_sigma_m=offset_m, angle_sigma_deg=angle_deg, growth_sigma_m=growth_m)
 
 
 def model(repeats_m: float | None = None) -> TargetModel:
@@ -32,11 +32,13 @@ def test_a_surveyed_target_keeps_its_gate() -> None:
     assert for_uncertain_faces(mount(), as_built(0.001, 0.01), model()).gate_m == 0.05
 
 
-@pytest.mark.parametrize(("offset_m", "angle_deg"), [(0.02, 0.0), (0.0, 1.0), (0.02, 0.1)])
-def test_a_wall_that_nobody_has_surveyed_widens_it(offset_m: float, angle_deg: float) -> None:
-    """4 sigmas of its place, of its lean over half of its 4 m of depth, and of the noise."""
-    expected = 4 * np.sqrt(offset_m**2 + (np.radians(angle_deg) * 2.0) ** 2 + SCALE_M**2)
-    found = for_uncertain_faces(mount(), as_built(offset_m, angle_deg), model())
+@pytest.mark.parametrize(
+    ("offset_m", "angle_deg", "growth_m"), [(0.02, 0.0, 0.0), (0.0, 1.0, 0.0), (0.02, 0.1, 0.0), (0.01, 0.1, 0.03)]
+)
+def test_a_wall_that_nobody_has_surveyed_widens_it(offset_m: float, angle_deg: float, growth_m: float) -> None:
+    """4 sigmas of its place, of growth on it, of its lean over half of its 4 m of depth, and of the noise."""
+    expected = 4 * np.sqrt(offset_m**2 + growth_m**2 + (np.radians(angle_deg) * 2.0) ** 2 + SCALE_M**2)
+    found = for_uncertain_faces(mount(), as_built(offset_m, angle_deg, growth_m), model())
     assert found.gate_m == pytest.approx(expected)
 
 
