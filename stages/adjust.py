@@ -219,4 +219,5 @@ def weak_geometry(
         laser=config.laser,
         mbes=config.mbes,
     )
-    return geometry_table(setting, passes, soundings, adjustment.equations.normal, adjustment.solution)
+    rough = any(one.added.any() for one in adjustment.rough.values())
+    return geometry_table(setting, passes, soundings, adjustment.equations.normal, adjustment.solution, rough)

@@ -7,12 +7,10 @@ from typing import Any
 
 from tools.campaigns import DRIFT, Campaign
 from tools.drawn_errors import all_errors
+from tools.places import BOTH_SIDES, MOUNT
 
-MOUNT = {"pitch_deg": 1.2, "yaw_deg": -2.0, "y_m": 0.20, "z_m": -2.01}
-WIDE: dict[str, Any] = {  # a head that looks down and hears both sides, a scanner that sees both
-    "mbes": {"mount": MOUNT | {"roll_deg": -1.8, "x_m": 0.30}, "sector_deg": 150.0, "ping_rate_hz": 10.0},
-    "laser": {"field_deg": [-130.0, 130.0], "point_rate_hz": 10_000.0},
-}
+RATES: dict[str, dict[str, Any]] = {"mbes": {"ping_rate_hz": 10.0}, "laser": {"point_rate_hz": 10_000.0}}
+WIDE = {name: BOTH_SIDES[name] | RATES[name] for name in RATES}
 PORT: dict[str, Any] = {
     "mbes": {"mount": MOUNT | {"roll_deg": 48.8, "x_m": -0.30}, "ping_rate_hz": 10.0},
     "laser": {"field_deg": [-130.0, -30.0], "point_rate_hz": 5000.0},
@@ -23,7 +21,7 @@ COURSES = tuple(
     Campaign(name, 48, first_seed, {"ins": DRIFT, **blocks}, drawn=all_errors)
     for name, first_seed, blocks in (
         ("to port", 16000, PORT),
-        ("both ways", 16100, WIDE | {"track": {"courses": ["along", "back"]}}),
+        ("both ways", 16100, WIDE | {"track": BOTH_SIDES["track"]}),
         ("round a circle", 16200, WIDE | {"track": CIRCLE}),
     )
 )

@@ -55,7 +55,7 @@ def find_place(ins: Stream, laser: Stream, session: SessionConfig, depth_m: floa
 def _load(trajectory: Trajectory) -> None:
     """Load, while workers unpack points, what is used afterwards: two libraries and machine code, a second's work."""
     import scipy.linalg
-    import scipy.spatial  # noqa: F401
+    import scipy.spatial  # noqa: F401  loaded for those that use it later
 
     trajectory.poses_at(trajectory.t_ns[:1])
 

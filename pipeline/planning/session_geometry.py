@@ -35,8 +35,11 @@ def geometry_table(
     soundings: Mapping[str, int],
     normal: Array,
     solution: Solution,
+    rough: bool,
 ) -> pd.DataFrame:
     """Return table ``geometry``: the gaps in the geometry of the passes, and the remedy.
+
+    Further passes of a rough wall see the same bumps again: then no remedy is told.
 
     Parameters
     ----------
@@ -50,6 +53,8 @@ def geometry_table(
         Normal matrix of all parameters.
     solution : Solution
         The session's solution.
+    rough : bool
+        Whether the walls were found to be rough.
     """
     usual, tied = setting.plan.passes[0], setting.model.tied_families
     coverage = Coverage(
@@ -62,7 +67,9 @@ def geometry_table(
         heading_swing_deg=_measured(passes["heading_swing_deg"].median() * np.sqrt(2), usual.heading_swing_deg),
     )
     advice = geometry_advice(setting, coverage, normal, solution)
-    rows = [("gap", words) for words in advice.gaps] + ([("remedy", advice.remedy)] if advice.remedy else [])
+    rows = [("gap", words) for words in advice.gaps]
+    if advice.remedy and not rough:
+        rows.append(("remedy", advice.remedy))
     return pd.DataFrame(rows, columns=["kind", "words"])
 
 

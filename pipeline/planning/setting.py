@@ -34,7 +34,7 @@ class PredictionSetting:
     laser: Laser
     mbes: Mbes
     roughness_m: float = 0.0
-    roughness_length_m: float = 0.3
+    roughness_length_m: float = 0.0
 
     @property
     def half_length_m(self) -> float:

@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from markupsafe import Markup
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
@@ -14,6 +13,7 @@ from pipeline.results.pages import face_maps, height_chart, residual_plots, targ
 from pipeline.results.pages.cutting_plane import plane_by_points
 from pipeline.results.pages.families import shown_names, styles_of_families, together
 from pipeline.results.pages.rendering import FAMILY, MARKS, drawing_style
+from tests.support.figures import kept_figures
 
 HALF = np.sqrt(0.5)
 WATER_M = 0.4
@@ -61,16 +61,7 @@ def points_on(faces: pd.DataFrame, per_m2: float = 600.0, seed: int = 1) -> pd.D
 
 @pytest.fixture
 def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
-    found: list[Figure] = []
-
-    def kept(figure: Figure, _: str) -> Markup:
-        FigureCanvasAgg(figure).draw()
-        found.append(figure)
-        return Markup()
-
-    for module in (target_plots, face_maps, height_chart, residual_plots):
-        monkeypatch.setattr(module, "picture", kept)
-    return found
+    return kept_figures(monkeypatch, target_plots, face_maps, height_chart, residual_plots)
 
 
 def step_pattern(low: float, normalised: float, by: str = "height") -> pd.DataFrame:

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -18,6 +17,7 @@ from pipeline.maths.target.model import TargetModel
 from pipeline.results.pages import face_maps, target_plots
 from pipeline.results.pages.rendering import drawing_style
 from pipeline.target.design import target_of
+from tests.support.figures import kept_figures
 from tests.support.roots import ROOT
 from tests.support.targets import by_letters
 
@@ -65,16 +65,7 @@ def residuals_of(model: TargetModel, seed: int = 0) -> pd.DataFrame:
 
 @pytest.fixture
 def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
-    found: list[Figure] = []
-
-    def kept(figure: Figure, _: str) -> Markup:
-        FigureCanvasAgg(figure).draw()
-        found.append(figure)
-        return Markup()
-
-    for module in (target_plots, face_maps):
-        monkeypatch.setattr(module, "picture", kept)
-    return found
+    return kept_figures(monkeypatch, target_plots, face_maps)
 
 
 def draw(model: TargetModel, residuals: pd.DataFrame, solved: bool = True) -> None:
