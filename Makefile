@@ -133,7 +133,9 @@ montecarlo: $(SETUP) ## many simulated sessions: are the predicted sigmas true?
 	$(PY) -m tools.laser_pairs
 	$(PY) -m tools.two_heads
 	$(PY) -m tools.stress
-	$(PY) -m tools.place_campaign --sessions 12 > docs/accuracy/places.md
+	$(PY) -m tools.place_campaign > docs/accuracy/places.md
+	$(PY) -m tools.place_campaign --rough --only slip > docs/accuracy/walls.md
+	$(PY) -m tools.patch_campaign > docs/accuracy/patch.md
 	$(PY) -m tools.accuracy
 	$(PY) -m tools.patent_forms docs/patent.md
 

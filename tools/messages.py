@@ -27,8 +27,8 @@ PLACES = (  # where texts for people are made
     "pipeline/exports", "pipeline/finding/bottom.py", "pipeline/finding/dry_planes.py",
     "pipeline/finding/found_text.py", "pipeline/finding/kept_points.py", "pipeline/finding/place.py", "pipeline/fleet",
     "pipeline/georeference", "pipeline/language/chosen.py", "pipeline/maths",
-    "pipeline/limits", "pipeline/planning", "pipeline/readers", "pipeline/report", "pipeline/results", "pipeline/run",
-    "pipeline/simulation", "pipeline/starting", "pipeline/target", "stages",
+    "pipeline/limits", "pipeline/patch_test", "pipeline/planning", "pipeline/readers", "pipeline/report",
+    "pipeline/results", "pipeline/run", "pipeline/simulation", "pipeline/starting", "pipeline/target", "stages",
 )  # fmt: skip
 PROSE = re.compile(r"[A-Za-z]{2,}[,;:.]? +\(?[A-Za-z{]|\} [A-Za-z]{2,}")
 CODE = re.compile(r"[\w.*/{}\[\]:=-]*|(?:application|text)/.*|.*%[sd].*|<.*>|.*\.parquet.*|\^.*|.*\\\w.*", re.DOTALL)

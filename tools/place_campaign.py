@@ -38,6 +38,8 @@ from tools.session_rows import NAMES, error_columns
 FOLDER = Path("runs/places")
 ROUGH_PLACES = ("slip", "lock", "returns", "slope")
 FIRST_SEED = 70_000
+PLANNED = 5  # sessions of a place for which the plan is asked, too
+ONE_SINE = float(np.sqrt(0.75**2 + 0.25**2))  # amplitude of one sine of the same RMS as the simulator's two (Wave)
 AS_BUILT = AsBuilt(offset_sigma_m=0.02, angle_sigma_deg=0.1, bow_sigma_m=0.005, growth_sigma_m=0.015)
 TARGET = {"kind": "found", "depth_m": 4.0}
 
@@ -129,13 +131,25 @@ def _predicted(
     (place / "session.yaml").write_text(yaml.safe_dump(settled), encoding="utf-8")
     pool.write_text(yaml.safe_dump(found | {"verdict": {"purpose": purpose}}), encoding="utf-8")
     settings = parse(Scenario, scenario, "place")
-    courses = settings.track.courses
+    courses, motion = settings.track.courses, settings.motion
     content = {
         "ins_rate_hz": settings.ins.rate_hz,
+        "unrest": {
+            "roll_deg": ONE_SINE * motion.roll.amplitude,
+            "pitch_deg": ONE_SINE * motion.pitch.amplitude,
+            "sway_m": ONE_SINE * motion.sway.amplitude,
+            "heave_m": ONE_SINE * motion.heave.amplitude,
+            "period_s": motion.roll.period_s,
+        },
         "laser": settings.laser.model_dump(include={"point_rate_hz", "line_rate_hz", "field_deg"}, mode="json"),
         "mbes": settings.mbes.model_dump(include={"ping_rate_hz", "sector_deg"}, mode="json"),
         "passes": [
-            {"distance_m": distance, "course": courses[k % len(courses)], "half_length_m": settings.half_length_m}
+            {
+                "distance_m": distance,
+                "course": courses[k % len(courses)],
+                "half_length_m": settings.half_length_m,
+                "heading_swing_deg": ONE_SINE * motion.heading.amplitude,
+            }
             for k, distance in enumerate(settings.track.distances_m)
         ],
     }
@@ -181,7 +195,7 @@ def main() -> None:
     for place in given.only or (ROUGH_PLACES if given.rough else PLACES):
         first = FIRST_SEED + 1000 * list(PLACES).index(place)
         tasks = [
-            Task(place, first + k, planned=k == 0 or given.rough, drawn=given.drawn, rough=given.rough)
+            Task(place, first + k, planned=k < PLANNED or given.rough, drawn=given.drawn, rough=given.rough)
             for k in range(given.sessions)
         ]
         path = FOLDER / f"{'rough-' * given.rough}{place}.parquet"

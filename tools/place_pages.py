@@ -19,8 +19,9 @@ head that looks to starboard.
 EXPLAINED = """
 The normalised squared error (NSE) by the total covariance is 6 in the mean if the sigmas are true. A session of which a
 test or a search says that something is wrong is rejected, and its NSE stands in the last column but one, not in the
-first. "Plan" is the total sigma that `poolcal plan` predicts for the same passes at the first session's faces, with the
-mount that it gave: walls that look one way show yaw by its sine.
+first. "Plan" is the total sigma that `poolcal plan` predicts for the same passes and for unrest of the same RMS, the
+median of the first five sessions: each at the faces that it found, with the mount that it gave (walls that look one way
+show yaw by its sine).
 """
 
 
@@ -41,14 +42,15 @@ def _line(place: str, rows: pd.DataFrame) -> str:
     accepted = rows["verdict"] == "accepted"
     weak = ~accepted & codes.map(lambda words: set(words.split()) <= WEAK_ALONE)
     honest, others = rows[accepted | weak], rows[~(accepted | weak)]
+    of_plan = rows[rows["planned_roll"].notna()]
     errors, totals, planned = (
         part[[f"{kind}_{name}" for name in NAMES]].to_numpy(float)
-        for kind, part in (("error", rows[accepted]), ("total", honest), ("planned", rows.iloc[:1]))
+        for kind, part in (("error", rows[accepted]), ("total", honest), ("planned", of_plan))
     )
     low, high = nse_band(max(len(honest), 1))
     worst = np.abs(errors / rows.loc[accepted, [f"total_{name}" for name in NAMES]].to_numpy(float))
     medians = np.median(totals, axis=0) if len(honest) else np.full(len(NAMES), np.nan)
-    against = (medians / planned)[0]
+    against = medians / np.median(planned, axis=0)
     reasons = ", ".join(sorted({word for words in codes[others.index] for word in words.split()} - WEAK_ALONE))
     cells = (
         place, f"{int(accepted.sum())} of {len(rows)}", str(int(weak.sum())),

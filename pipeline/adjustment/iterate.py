@@ -80,7 +80,9 @@ class Iterate:
         return Iterate(linearisation, drift, self.priors), solution
 
     def record_noise(self, noise: PoseNoise) -> EpochVarianceFactor:
-        """Return the variance factor of the records' white noise, from the laser's points."""
+        """Return the variance factor of the records' white noise, from the laser's points; without them unknown."""
+        if "laser" not in self.linearisation.sums:
+            return EpochVarianceFactor(1.0, np.inf)
         surfaces = self.linearisation.state.surfaces
         designs = pose_design(surfaces, np.arange(len(surfaces)))
         return record_noise_factor(self.linearisation.sums["laser"], designs, noise.white)

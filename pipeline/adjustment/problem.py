@@ -85,6 +85,10 @@ class PriorInformation:
         """All pseudo-observations."""
         return tuple(prior for prior in (self.surfaces, self.parameters) if prior is not None)
 
+    def of_mount(self, state: State) -> bool:
+        """Return whether the mount itself is known beforehand: then it is near, and has no other side."""
+        return bool(np.isin(self.known_parameters, state.mounts).any())
+
     @property
     def known_parameters(self) -> Integers:
         """Numbers (k,) of the parameters whose values are known beforehand."""

@@ -60,11 +60,11 @@ def chosen_iteration(
 ) -> ChosenIteration:
     """Return the iteration with the smaller sum of squares; parameters as for :func:`weighted_iteration`."""
     first = weighted_iteration(problem, streams, settings, gap_s)
-    may_differ = problem.prior.from_start and "mbes" in streams and not first.deficient
+    prior, coarse = problem.prior, problem.model.coarse
+    may_differ = prior.from_start and not prior.of_mount(coarse) and "mbes" in streams and not first.deficient
     mirrored = None if not may_differ else mirrored_mount(first.last.linearisation)
     if mirrored is None:
         return ChosenIteration(first)
-    coarse = problem.model.coarse
     if len(coarse.heads) > 1:  # each could be on either side: that is not tried, but doubted
         return ChosenIteration(first, Rival(mirrored.deviation_from(first.last.linearisation.state)[:N_MOUNT], 0.0))
     start = replace(coarse, R_body_from_sensor=mirrored.R_body_from_sensor, lever_arm_m=mirrored.lever_arm_m)

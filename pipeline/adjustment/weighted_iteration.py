@@ -105,9 +105,10 @@ def weighted_iteration(
     gap_s : float
         A longer time (s) without observations interrupts the knots of the drift.
     begin : State, optional
-        Where to start; by default, the coarse mount brought near the surfaces.
+        Where to start; by default, the coarse mount, brought near the surfaces unless it is known beforehand.
     """
     model, prior = problem.model, problem.prior
+    begin = model.coarse if begin is None and prior.of_mount(model.coarse) else begin
     state = initial_mounts(streams, model) if begin is None else begin
     values = CurrentValues(state, weighting=Weighting(white=prior.noise.white))
     estimated = np.array(estimated_columns(state, settings.free, mount=state.calibrated in streams))

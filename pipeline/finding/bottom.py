@@ -31,6 +31,18 @@ MOST = 24  # pieces
 
 
 @dataclass(frozen=True)
+class PieceLimits:
+    """How far a piece's passes may differ, and how uneven and how bent it may be, m."""
+
+    apart_m: float
+    uneven_m: float
+    bow_m: float
+
+
+STRICT = PieceLimits(APART_M, UNEVEN_M, BOW_M)
+
+
+@dataclass(frozen=True)
 class BottomPiece:
     """A square of the bottom: its corners (4, 3), counter-clockwise from above, and what it is made of.
 
@@ -46,8 +58,16 @@ class BottomPiece:
     apart_m: float
     refused: str = ""
 
+    @property
+    def normal(self) -> Array:
+        """The unit normal (3,), upward."""
+        normal = np.cross(self.corners_m[1] - self.corners_m[0], self.corners_m[3] - self.corners_m[0])
+        return np.asarray(normal / np.linalg.norm(normal))
 
-def bottom_pieces(points_m: Array, number_of_pass: NDArray[np.int16], level_m: float) -> list[BottomPiece]:
+
+def bottom_pieces(
+    points_m: Array, number_of_pass: NDArray[np.int16], level_m: float, limits: PieceLimits = STRICT
+) -> list[BottomPiece]:
     """Return the pieces of the bottom, those that serve first: by number of passes, then of soundings.
 
     Parameters
@@ -58,6 +78,8 @@ def bottom_pieces(points_m: Array, number_of_pass: NDArray[np.int16], level_m: f
         Their passes (n,).
     level_m
         Height of the water.
+    limits
+        What a piece is refused for.
     """
     deep = np.flatnonzero(points_m[:, 2] < level_m - SHALLOWEST_M)
     keys, square, count = cells_of(points_m[deep, :2], SIDE_M)
@@ -66,17 +88,30 @@ def bottom_pieces(points_m: Array, number_of_pass: NDArray[np.int16], level_m: f
     pieces = []
     for k in np.flatnonzero(count >= FEWEST).tolist():
         rows = deep[order[ends[k] - count[k] : ends[k]]]
-        pieces.append(_piece(points_m[rows], number_of_pass[rows], keys[k] * SIDE_M, level_m))
+        pieces.append(_piece(points_m[rows], number_of_pass[rows], keys[k] * SIDE_M, level_m, limits))
     return sorted(pieces, key=lambda piece: (bool(piece.refused), -len(piece.passes), -piece.soundings))
 
 
-def serving(pieces: Sequence[BottomPiece]) -> list[BottomPiece]:
-    """Return the pieces that serve, at most ``MOST``, in the order in which they are numbered: along y, then x."""
-    best = [piece for piece in pieces if not piece.refused][:MOST]
+def serving(pieces: Sequence[BottomPiece], steepest: int = 0) -> list[BottomPiece]:
+    """Return the pieces that serve, at most ``MOST``, in the order in which they are numbered: along y, then x.
+
+    Parameters
+    ----------
+    pieces
+        The pieces, the best first.
+    steepest
+        Number of places that are for the steepest ones: of a wide level bottom slopes tell what the rest does not.
+    """
+    serve = [piece for piece in pieces if not piece.refused]
+    steep = sorted(serve, key=lambda piece: -piece.slope_deg)[:steepest]
+    taken = {id(piece) for piece in steep}
+    best = [*steep, *(piece for piece in serve if id(piece) not in taken)][:MOST]
     return sorted(best, key=lambda piece: (round(float(piece.corners_m[:, 1].mean()), 3), piece.corners_m[0, 0]))
 
 
-def _piece(points_m: Array, number_of_pass: NDArray[np.int16], low_m: Array, level_m: float) -> BottomPiece:
+def _piece(
+    points_m: Array, number_of_pass: NDArray[np.int16], low_m: Array, level_m: float, limits: PieceLimits
+) -> BottomPiece:
     plane = _plane(points_m - [*low_m, 0.0])
     away = points_m[:, 2] - _heights(plane, points_m[:, :2] - low_m)
     slope_deg = float(np.degrees(np.arctan(np.hypot(*plane[:2]))))
@@ -98,7 +133,7 @@ def _piece(points_m: Array, number_of_pass: NDArray[np.int16], low_m: Array, lev
         uneven_m=_unevenness(places, away[on]),
         apart_m=float(np.ptp(means)) if means else 0.0,
     )
-    return replace(made, refused=_refusal(made, flat.bow_m, flat.covered))
+    return replace(made, refused=_refusal(made, flat.bow_m, flat.covered, limits))
 
 
 def _plane(points_m: Array) -> Array:
@@ -140,16 +175,16 @@ def _passes(places_m: Array, away_m: Array, number_of_pass: NDArray[np.int16], l
     return found
 
 
-def _refusal(piece: BottomPiece, bow_m: float, covered: float) -> str:
+def _refusal(piece: BottomPiece, bow_m: float, covered: float, limits: PieceLimits) -> str:
     """Return why a piece cannot serve; "" if it can."""
     if len(piece.passes) < 2:
         return "heard in one pass" if piece.passes else "heard in part"
     if piece.slope_deg > STEEPEST_DEG:
         return f"steep, {piece.slope_deg:.0f}°"
-    if piece.apart_m > APART_M:
+    if piece.apart_m > limits.apart_m:
         return f"passes differ by {1000 * piece.apart_m:.0f} mm"
-    if piece.uneven_m > UNEVEN_M:
+    if piece.uneven_m > limits.uneven_m:
         return f"uneven, {1000 * piece.uneven_m:.0f} mm"
-    if bow_m > BOW_M:
+    if bow_m > limits.bow_m:
         return f"bent by {1000 * bow_m:.0f} mm"
     return f"only {100 * covered:.0f} % of it heard" if covered < COVERED else ""

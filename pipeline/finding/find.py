@@ -2,20 +2,14 @@
 
 from dataclasses import replace
 
-import numpy as np
-import pandas as pd
-
-from pipeline.adjustment.ins_drift import drift_model, pose_noise
-from pipeline.artefacts.catalogue.points import INS_SIGMAS
-from pipeline.artefacts.streams import Batch, Stream
+from pipeline.artefacts.streams import Stream
 from pipeline.config.session import SessionConfig
-from pipeline.config.stage_settings import InsErrors, LaserPlacement, LaserPoints, narrow
+from pipeline.config.stage_settings import LaserPlacement, LaserPoints, narrow
 from pipeline.finding.dry_planes import dry_planes, reaching_water, water_level_m
 from pipeline.finding.kept_points import kept_points, level_context
 from pipeline.finding.place import FoundPlace, found_place
-from pipeline.finding.reading import read_files
+from pipeline.finding.reading import noise_over_all, read_files
 from pipeline.finding.without_drift import track_without_drift
-from pipeline.maths.adjustment.pose_errors import PoseNoise
 from pipeline.maths.geometry.trajectory import Trajectory
 from pipeline.mount import mount_of
 
@@ -42,7 +36,7 @@ def find_place(ins: Stream, laser: Stream, session: SessionConfig, depth_m: floa
     boat_m = context.trajectory.positions_m.mean(axis=0)
     some = points.level_m[:: max(1, len(points) // PROVISIONAL)]
     serving = [plane for plane in dry_planes(some, boat_m, laser.here) if not plane.refused]
-    noise = _pose_noise(session, sigmas, records["t_ns"].to_numpy())
+    noise = noise_over_all(session.ins, sigmas, records["t_ns"].to_numpy())
     trajectory = track_without_drift(points, serving, mount, narrow(LaserPoints, session.laser), noise, laser.here)
     planes = dry_planes(points.along(trajectory, mount).level_m, boat_m, laser.here)
     level_m = water_level_m(planes)
@@ -58,12 +52,3 @@ def _load(trajectory: Trajectory) -> None:
     import scipy.spatial  # noqa: F401  loaded for those that use it later
 
     trajectory.poses_at(trajectory.t_ns[:1])
-
-
-def _pose_noise(session: SessionConfig, sigmas: list[Batch], t_ns: np.ndarray) -> PoseNoise:
-    """Return the INS's errors over the whole session."""
-    names = [column.name for column in INS_SIGMAS.columns]
-    stated = {name: np.concatenate([chunk[name] for chunk in sigmas]) for name in names} if sigmas else {}
-    whole = pd.DataFrame({"start_ns": t_ns[:1], "end_ns": t_ns[-1:]})
-    drift = drift_model(narrow(InsErrors, session.ins), pd.DataFrame(stated, columns=names), whole)
-    return pose_noise(drift, session.ins.white)

@@ -8,10 +8,15 @@ from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
+from pipeline.adjustment.ins_drift import drift_model, pose_noise
+from pipeline.artefacts.catalogue.points import INS_SIGMAS
 from pipeline.artefacts.streams import Batch, Part, Stream
+from pipeline.config.session import Ins
 from pipeline.finding.kept_points import Columns, drawn_points, first_limit
+from pipeline.maths.adjustment.pose_errors import PoseNoise
 from pipeline.readers.file_summaries import thin_sigmas
 from pipeline.readers.track_tables import trajectory_table
 
@@ -29,6 +34,14 @@ def read_files(ins: Stream, laser: Stream) -> tuple[pd.DataFrame, list[Batch], I
     read = [next(results) for _ in work]
     records = trajectory_table([batch for batches, _ in read for batch in batches])[0]
     return records, [batch for _, sigmas in read for batch in sigmas], results
+
+
+def noise_over_all(ins: Ins, sigmas: list[Batch], t_ns: np.ndarray) -> PoseNoise:
+    """Return the INS's errors over the whole session, whose records have the times (n,), by its files or settings."""
+    names = [column.name for column in INS_SIGMAS.columns]
+    stated = {name: np.concatenate([chunk[name] for chunk in sigmas]) for name in names} if sigmas else {}
+    whole = pd.DataFrame({"start_ns": t_ns[:1], "end_ns": t_ns[-1:]})
+    return pose_noise(drift_model(ins, pd.DataFrame(stated, columns=names), whole), ins.white)
 
 
 def _called(work: partial[Any]) -> Any:

@@ -92,3 +92,20 @@ def _coarse(
     from stages.commands import coarse
 
     return coarse.command(file, session, out, write)
+
+
+@app.command("patch")
+def _patch(
+    session: Session,
+    run: Annotated[
+        Path | None, typer.Option("--run", metavar="RUN", help="a run of this boat: does its mount agree?")
+    ] = None,
+    water_height: Annotated[
+        float | None, typer.Option("--water-height", metavar="M", help="height of the water in the INS's datum")
+    ] = None,
+    jobs: Jobs = None,
+) -> int:
+    """Find the sonar's angles from passes over the bottom alone: a patch test. Status 1 if a run does not agree."""
+    from stages.commands import patch
+
+    return patch.command(session, run, water_height, jobs)

@@ -1,0 +1,63 @@
+"""The step of a sonar's angles that brings passes over a bottom together: the patch test as one least-squares problem.
+
+A sounding lies at X = p + R (s + l): p and R (body to level frame) the pose, l the lever arm, s the sounding from the
+head in body axes. A small rotation ε of the mount, body axes, turns s into s + ε × s, and moves X by (R ε) × u with u =
+R s, the vector from the head to the sounding in the level frame. On a piece of bottom z = α + a x + b y the sounding's
+misfit is v = z - a x - b y - α, and with m = (-a, -b, 1)
+
+    dv = m · ((R ε) × u) = (u × m) · (R ε) = g · ε,        g = Rᵀ (u × m).
+
+α, a, b of each piece are unknown: of v and of g only what no plane over the piece takes up counts. So a level bottom
+tells of roll by u square to the pass, which changes its sign with the pass, of pitch in the same way by u along it, and
+of yaw nothing: g of yaw is u × m along the vertical, which is the slope times the distance. The lever arm is taken as
+known, and poses as true: the step leads near enough for an adjustment.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+CUT = 3.0  # RMS of a piece; soundings farther from its plane do not count
+
+
+@dataclass(frozen=True)
+class PieceSoundings:
+    """Soundings on one piece of bottom, level frame, m: places (n, 3), vectors from the head (n, 3), R (n, 3, 3)."""
+
+    places_m: Array
+    from_head_m: Array
+    R_level_from_body: Array
+
+
+def patch_step(pieces: Iterable[PieceSoundings], noise_m: float, known_rad: float, turned_rad: Array) -> Array:
+    """Return the rotation ε (3,) rad, body axes, by which the mount is to be turned further.
+
+    Parameters
+    ----------
+    pieces
+        Soundings of several passes, piece by piece.
+    noise_m
+        Standard deviation of what passes differ by on a piece, whatever the angles: a piece is one observation.
+    known_rad
+        That of each angle, as known beforehand: it holds an angle of which the soundings tell nothing.
+    turned_rad
+        Rotation vector (3,) by which the mount has been turned from what is known beforehand.
+    """
+    normal = np.eye(3) * (noise_m / known_rad) ** 2
+    right = normal @ turned_rad
+    for piece in pieces:
+        about_mean, height = piece.places_m[:, :2] - piece.places_m[:, :2].mean(axis=0), piece.places_m[:, 2]
+        plane = np.column_stack([about_mean, np.ones(len(height))])
+        off = height - plane @ np.linalg.lstsq(plane, height, rcond=None)[0]
+        use = np.abs(off) <= CUT * np.sqrt(np.mean(off**2))
+        plane, height = plane[use], height[use]
+        a, b, _ = np.linalg.lstsq(plane, height, rcond=None)[0]
+        turned = np.cross(piece.from_head_m[use], np.array([-a, -b, 1.0]))
+        both = np.column_stack([np.einsum("nji,nj->ni", piece.R_level_from_body[use], turned), height])
+        left = both - plane @ np.linalg.lstsq(plane, both, rcond=None)[0]
+        normal += left[:, :3].T @ left[:, :3] / len(left)
+        right += left[:, :3].T @ left[:, 3] / len(left)
+    return np.asarray(-np.linalg.solve(normal, right))

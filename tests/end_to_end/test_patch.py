@@ -1,0 +1,121 @@
+"""poolcal patch: angles from passes over the bottom alone, what they do not show, and a run that agrees or does not."""
+
+import re
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pipeline.atomic_files import read_json
+from pipeline.maths.geometry.rotations import mount_from_rotation
+from tests.support.docks import of_faces
+from tests.support.places import Told, edit, poolcal, simulate
+
+NAMES = ("roll", "pitch", "yaw")
+ROW = re.compile(r"^ +(roll|pitch|yaw) ° +(\S+) +(not seen|\S+) *(\S*) *(\S*) *(\S*)$", re.MULTILINE)
+
+
+def bottom(north_m: float) -> dict[str, Any]:
+    """A target of a level bottom and one that rises to the north, heard both ways; a quay ashore keeps the laser busy.
+
+    The small scenario's head looks to starboard, so each square is heard from its one side, then from the other.
+    """
+    faces = {
+        "level": {"corners": [[-13, -7, -6], [-1, -7, -6], [-1, 0, -6], [-13, 0, -6]], "seen": "wet"},
+        "slope": {"corners": [[-13, 0, -6], [-1, 0, -6], [-1, 7, north_m], [-13, 7, north_m]], "seen": "wet"},
+        "quay": {"corners": [[6, 6, 0.3], [6, -6, 0.3], [6, -6, 2], [6, 6, 2]], "seen": "dry"},
+    }
+    return of_faces(faces, azimuth_deg=163.0) | {
+        "track": {
+            "distances_m": [12.0, 3.0, 10.0, 5.0], "courses": ["along", "back"], "half_length_m": 9.0, "speed_m_s": 0.8,
+        },
+        "laser": {"point_rate_hz": 500.0, "line_rate_hz": 20.0, "format": "las"},
+    }  # fmt: skip
+
+
+def patched(session: Path, *words: object) -> Told:
+    return poolcal("patch", session, "--jobs", 1, *words)
+
+
+def rows(told: Told) -> dict[str, list[str]]:
+    return {name: list(cells) for name, *cells in ROW.findall(told.out)}
+
+
+def true_angles_deg(session: Path) -> np.ndarray:
+    truth = read_json(Path(f"{session}.truth.json"))["mbes"]
+    return np.degrees(mount_from_rotation(np.array(truth["R_body_from_mbes"])))
+
+
+@pytest.fixture(scope="module")
+def sloping(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A session over a slope of 20°; its coarse angles are wrong by 2.5°."""
+    coarse = {"roll_deg": 2.5, "pitch_deg": -2.5, "yaw_deg": 2.5, "x_m": 0.02, "y_m": -0.02, "z_m": 0.02}
+    folder = tmp_path_factory.mktemp("patch") / "session"
+    return simulate(folder, 5, **bottom(-3.5), mbes={"coarse_error": coarse})
+
+
+def test_angles_come_from_the_bottom_alone(sloping: Path) -> None:
+    told = patched(sloping)
+    assert told.status == 0, told.err
+    found = rows(told)
+    assert tuple(found) == NAMES
+    values, sigmas = (np.array([float(found[name][k]) for name in NAMES]) for k in (1, 2))
+    assert np.abs((values - true_angles_deg(sloping)) / sigmas).max() < 4
+    assert sigmas[0] < 0.03
+    assert sigmas[1:].max() < 0.3  # of a lever arm of 5 cm at some metres
+    assert np.abs(values - [float(found[name][0]) for name in NAMES]).min() > 1.5  # of the coarse angles
+    assert "The lever arm is not seen by such passes: x, y, z stay as they are." in told.out
+    assert "Patch test of 4 passes: " in told.out
+
+
+def test_the_same_files_give_the_same_text_with_two_workers(sloping: Path) -> None:
+    assert poolcal("patch", sloping, "--jobs", 2).out == patched(sloping).out
+
+
+def test_a_run_agrees_and_a_head_that_was_turned_does_not(
+    sloping: Path, undisturbed: tuple[Path, Told], tmp_path: Path
+) -> None:
+    run, _ = undisturbed
+    told = patched(sloping, "--run", run)
+    assert told.status == 0, told.out
+    assert "run and the passes agree." in told.out
+    assert all(float(cells[4]) < 3.3 for cells in rows(told).values())
+
+    turned = simulate(
+        tmp_path / "turned", 6, **bottom(-3.5), mbes={"mount": {
+            "roll_deg": -48.4, "pitch_deg": 1.2, "yaw_deg": -2.0, "x_m": 0.30, "y_m": 0.20, "z_m": -2.01}}
+    )  # fmt: skip
+    told = patched(turned, "--run", run)
+    assert told.status == 1, told.out
+    assert "run and the passes do not agree: do not enter these angles before you know why." in told.out
+    assert float(rows(told)["roll"][3]) == pytest.approx(0.4, abs=0.05)  # by how much, and its sign
+
+
+def test_passes_one_way_at_one_distance_do_not_show_roll(tmp_path: Path) -> None:
+    blocks = bottom(-6.0)
+    blocks["track"] |= {"distances_m": [12.0, 12.0, 12.0], "courses": ["along"]}
+    told = patched(simulate(tmp_path / "session", 7, **blocks))
+    assert told.status == 0, told.err
+    assert "not seen" in rows(told)["roll"][1]
+    assert "Not seen: roll" in told.out
+
+
+def test_refusals_say_what_to_do(sloping: Path, tmp_path: Path) -> None:
+    cast = tmp_path / "cast"
+    shutil.copytree(sloping, cast)
+    edit(cast / "session.yaml", "mbes", svp=[[0.0, 1500.0], [10.0, 1501.0]])
+    told = patched(cast)
+    assert told.status == 2
+    assert told.err.startswith("poolcal: --water-height: is missing: mbes.svp counts depths from the water; ")
+    told = patched(cast, "--water-height", 12.0)
+    assert told.status == 0, told.err
+
+    none = tmp_path / "none"
+    shutil.copytree(sloping, none)
+    edit(none / "session.yaml", "mbes", mount={"roll_deg": 120.0})
+    told = patched(none)
+    assert told.status == 2
+    assert told.err.startswith("poolcal: mbes: ")
+    assert len(told.err.splitlines()) == 1
