@@ -26,6 +26,7 @@ from pipeline.maths.adjustment.parts import Deviation, deviation
 from pipeline.maths.adjustment.solution import Solution, solve
 from pipeline.maths.geometry.passes import pass_of
 from pipeline.maths.mount_parameters import PARAMETERS
+from pipeline.maths.target.bottom_names import shown_name
 
 Integers = NDArray[np.int64]
 NO_WEIGHT = 1e12  # divisor of the weights of soundings that are left out
@@ -114,23 +115,27 @@ def _of_heads(
 
 
 def _without_faces(problem: CalibrationProblem, adjustment: MountAdjustment) -> Iterator[tuple[str, Deviation]]:
-    """Yield the deviations without the soundings on each surface, where nobody has surveyed the walls."""
+    """Yield the deviations without the soundings on each surface, where nobody has surveyed the walls.
+
+    The pieces of the bottom are left out together: what hangs on one of two dozen says little.
+    """
     whole, last, noise = adjustment.solution, adjustment.last, adjustment.drift_figures.noise
     heads = {head: sums for head, sums in last.linearisation.sums.items() if kind_of(head) == "mbes"}
     if whole.deficiency or not problem.prior.from_start or not heads:
         return
     surfaces = adjustment.state.surfaces
     seen = np.unique(np.concatenate([soundings.surface for soundings in heads.values()])).tolist()
-    for number in seen if len(seen) > 1 else ():
-        change = partial(by_divisors, divisors=np.where(np.arange(len(surfaces)) == number, NO_WEIGHT, 1.0))
+    names = np.array([shown_name(surface.family) for surface in surfaces])
+    told = list(dict.fromkeys(names[seen].tolist()))
+    for name in told if len(told) > 1 else ():
+        change = partial(by_divisors, divisors=np.where(names == name, NO_WEIGHT, 1.0))
         left = last.linearisation
         for head, soundings in heads.items():
             left = left.with_sums(head, soundings.changed(change))
         equations = replace(last, linearisation=left).equations(noise)
         solution = solve(equations.normal, equations.right, whole.estimated.tolist())
         if not solution.deficiency:
-            part = f"without the soundings on {surfaces[number].family}"
-            yield from _of_heads(part, problem, adjustment, solution)
+            yield from _of_heads(f"without the soundings on {name}", problem, adjustment, solution)
 
 
 def _passes_of(record: Integers, pass_of_record: Integers) -> Integers:

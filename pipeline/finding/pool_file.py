@@ -9,12 +9,12 @@ import yaml
 from pipeline.config.pool import PoolConfig
 from pipeline.finding.bottom import BottomPiece
 from pipeline.finding.place import DIGITS, FoundPlace
+from pipeline.maths.target.bottom_names import BOTTOM
 
 Face = TypeVar("Face")
 
 FIRST = "# A target found by poolcal target in the laser's points. Strike faces that are no wall below the water:"
 FIRST_OF_BOTTOM = "# A target of walls and pieces of the bottom, these by poolcal target --bottom."
-BOTTOM = "bottom-"  # names of the pieces begin so
 AS_BUILT = """\
 as_built:                       # of walls below the water that nobody has surveyed: fouled, weathered
   offset_sigma_m: 0.02

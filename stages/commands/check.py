@@ -39,9 +39,10 @@ def command(session: Path, config: Path | None, as_json: bool) -> int:
         True: print JSON, for programs.
     """
     find = partial(found_target, session, workers=SERIAL)
-    settings = None if config is None else load_settings(session, config, None, find)
-    content, pool = (load_session(session, with_cast), None) if settings is None else (settings.session, settings.pool)
     progress = Progress()
+    with progress.shown("reading the settings; a target that is to be found is found now"):
+        settings = None if config is None else load_settings(session, config, None, find)
+    content, pool = (load_session(session, with_cast), None) if settings is None else (settings.session, settings.pool)
     with progress.shown("reading and comparing the files"):
         findings = check_session(session, content, pool, partial(_calibrated, progress))
     from_files = findings.quality.sigmas if content.ins.drift_from == "files" else {}

@@ -17,6 +17,7 @@ from pipeline.patch_test.solve import HeadBefore, patch_test
 from pipeline.readers.casts import with_cast
 from pipeline.readers.dispatch import raw_parts
 from pipeline.results.finished_run import FinishedRun
+from pipeline.run.progress import Progress
 from pipeline.run.workers import Workers, workers
 from stages import ORDER
 from stages.commands.answer import print_answer
@@ -47,7 +48,7 @@ def command(folder: Path, run_folder: Path | None, water_height_m: float | None,
         target = run.settings.pool.target
         water_height_m = target.origin.height_m + target.water_level_m
     said, agree = [], True
-    with workers(jobs, None) as pool:
+    with workers(jobs, None) as pool, Progress().shown("reading the soundings, and adjusting the angles"):
         for name, mbes in session.heads.items():
             text, agrees = _head(folder, session, (name, mbes), run, water_height_m, pool)
             said.append(f"{translated('head')} {name}\n\n{text}" if len(session.heads) > 1 else text)

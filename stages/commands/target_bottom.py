@@ -15,7 +15,7 @@ from pipeline.atomic_files import write_text
 from pipeline.config.stage_settings import SonarPlacement, narrow
 from pipeline.config.target import Faces
 from pipeline.errors import ConfigError
-from pipeline.finding.bottom import BottomPiece, bottom_pieces, serving
+from pipeline.finding.bottom import APART_M, BottomPiece, bottom_pieces, serving
 from pipeline.finding.kept_points import EVERYWHERE
 from pipeline.finding.kept_soundings import KeptSoundings, kept_soundings
 from pipeline.finding.pool_file import FIRST_OF_BOTTOM, walls_of, with_bottom_yaml
@@ -121,7 +121,8 @@ def _table(pieces: Sequence[BottomPiece], used: Sequence[BottomPiece], read: int
     ]
     heads = ["face", "depth m", "slope °", "uneven mm", "apart mm", "passes", "soundings", ""]
     said = f"{read:,} soundings: {len(used)} of {len(pieces)} pieces of the bottom can serve."
-    return "\n".join([said, "", *text_table("  <10>9>9>11>10>8>11  <1", heads, rows)])
+    largest = f"Apart: by how much the means of passes differ, {1000 * APART_M:.0f} mm at most."
+    return "\n".join([said, "", *text_table("  <10>9>9>11>10>8>11  <1", heads, rows), largest])
 
 
 def _row(name: str, piece: BottomPiece, why: str = "") -> list[str]:

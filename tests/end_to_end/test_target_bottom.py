@@ -46,6 +46,7 @@ def test_the_bottom_makes_the_same_session_better(dock: tuple[Path, Path, Told],
     told = poolcal("target", session, "--bottom", run, "--out", wall)
     assert told.status == 0, told.err
     assert " pieces of the bottom can serve." in told.out
+    assert "Apart: by how much the means of passes differ, 60 mm at most." in told.out
     written = yaml.safe_load(wall.read_text("utf-8"))
     pieces = {name: face for name, face in written["target"]["faces"].items() if name.startswith("bottom-")}
     assert len(pieces) >= 4
@@ -62,6 +63,8 @@ def test_the_bottom_makes_the_same_session_better(dock: tuple[Path, Path, Told],
     assert after["roll_deg"] < 0.5 * before["roll_deg"]
     assert after["pitch_deg"] < before["pitch_deg"]
     assert errors_in_sigmas(again, session).max() < 4.5
+    named = [part["part"] for part in result_of(again)["parts"]]
+    assert [name for name in named if "bottom" in name] == ["without the soundings on bottom"]  # all pieces at once
     warned = " ".join(result_of(again)["warnings"])
     assert "no horizontal face is seen by both sensors" in warned  # a bottom ties no heights
     assert "bottom-" not in warned  # and was not found in laser points

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from pipeline.adjustment.residual_tables import FEWEST
 from pipeline.artefacts.from_tables import family_names, normal_of
 from pipeline.maths.geometry.face_grid import face_axes, lies_flat
-from pipeline.results.pages.families import PIECES, shown_name, shown_names
+from pipeline.maths.target.bottom_names import PIECES, shown_name
+from pipeline.results.pages.families import shown_names
 from pipeline.results.pages.rendering import QUIET, WIDTH_IN, picture
 from pipeline.results.pages.target_plots import MOST_PANELS, XYZ
 

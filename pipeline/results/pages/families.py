@@ -6,19 +6,9 @@ from typing import TypeVar
 import numpy as np
 import pandas as pd
 
-from pipeline.finding.pool_file import BOTTOM
+from pipeline.maths.target.bottom_names import PIECES, shown_name
 
 T = TypeVar("T")
-PIECES = BOTTOM.rstrip("-")  # what the pieces of the bottom are called together
-
-
-def shown_name(family: str) -> str:
-    """Return the name of a family in the pictures, where the pieces of the bottom are one.
-
-    >>> shown_name("bottom-7"), shown_name("bottom-left"), shown_name("wall-7")
-    ('bottom', 'bottom-left', 'wall-7')
-    """
-    return PIECES if family.startswith(BOTTOM) and family.removeprefix(BOTTOM).isdigit() else family
 
 
 def shown_names(families: Sequence[str]) -> list[str]:

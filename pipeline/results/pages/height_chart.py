@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from pipeline.adjustment.residual_tables import FEWEST
 from pipeline.artefacts.from_tables import family_names, horizontal_families
 from pipeline.maths.geometry.face_grid import bin_statistics
+from pipeline.maths.target.bottom_names import PIECES, shown_name
 from pipeline.mount import WITHIN_95
-from pipeline.results.pages.families import PIECES, shown_name, shown_names, styles_of_families
+from pipeline.results.pages.families import shown_names, styles_of_families
 from pipeline.results.pages.rendering import ALARM, FAMILY, INK, LASER, MARKS, QUIET, SONAR, WIDTH_IN, picture
 
 Array = NDArray[np.float64]

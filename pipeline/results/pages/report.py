@@ -33,6 +33,7 @@ from pipeline.config.changes import changed_settings
 from pipeline.config.target import Letters
 from pipeline.gps_time import utc_text
 from pipeline.maths.mount_parameters import PARAMETERS
+from pipeline.maths.target.bottom_names import PIECES
 from pipeline.maths.target.family_words import families_in_words
 from pipeline.report.as_built import design_shape, reference_family
 from pipeline.report.reason_codes import verdict_of
@@ -41,7 +42,7 @@ from pipeline.results.pages.certificate import certificate_values, value_rows
 from pipeline.results.pages.currency import page_digest
 from pipeline.results.pages.drift_words import drift_rows, drift_sentence
 from pipeline.results.pages.face_maps import families_of_maps
-from pipeline.results.pages.families import PIECES, shown_names
+from pipeline.results.pages.families import shown_names
 from pipeline.results.pages.instrument_table import instrument_rows
 from pipeline.results.pages.limiting_errors import limiting_sentences
 from pipeline.results.pages.mount_tables import METHODS, correlation_rows, method_rows, parameter_rows, part_rows

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from pipeline.adjustment.residual_tables import FEWEST
 from pipeline.artefacts.from_tables import family_names, horizontal_families, is_horizontal, normals_of
+from pipeline.maths.target.bottom_names import PIECES, shown_name
 from pipeline.results.pages.cutting_plane import (
     HALF_SLICE_M,
     CuttingPlane,
@@ -21,7 +22,6 @@ from pipeline.results.pages.cutting_plane import (
     plane_through,
     slopes_in,
 )
-from pipeline.results.pages.families import PIECES, shown_name
 from pipeline.results.pages.rendering import COARSE, INK, LASER, SONAR, WIDTH_IN, picture
 
 Array = NDArray[np.float64]
