@@ -10,13 +10,13 @@ from pipeline.console import plural
 from pipeline.language.chosen import translated
 from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.mount import Mounted, setting_change
-from pipeline.patch_test.solve import PatchTest
+from pipeline.patch_test.solve import UNEXPLAINED, PatchTest
 from pipeline.text_table import text_table, wrapped
 
 Array = NDArray[np.float64]
 ANGLES = PARAMETERS[:3]
+MOST_NAMED = 2  # contradictions: one error often moves several estimates
 AGREE = 3.3  # sigmas of the difference: chance exceeds it once in a thousand
-UNEXPLAINED = 1.5  # variance factor of what passes disagree by, above which a sentence says so
 
 
 @dataclass(frozen=True)
@@ -82,11 +82,14 @@ def _sentences(found: PatchTest, beside: Compared) -> list[str]:
             f"Not seen: {', '.join(unseen)}. Sail both ways, side by side, over a slope: roll needs a bottom that is "
             "heard both ways, pitch and yaw need a slope along the passes, yaw at different distances aside."
         )
+    said += [f"The soundings contradict session.yaml: {words}." for words in found.contradicted[:MOST_NAMED]]
     if found.factor > UNEXPLAINED:
         said.append(
             f"The passes disagree by {np.sqrt(found.factor):.1f} times what the sigmas in session.yaml explain, and so "
             "the sigmas are larger by that: tide or heave between them, or the sound speed."
         )
+    if found.doubtful:
+        said.append("Do not use these angles before that is mended.")
     if not found.settled:
         said.append("The result still changes by half a sigma with the pieces: sail more passes.")
     if beside.covariance is not None and len(unseen) < len(ANGLES):

@@ -33,12 +33,14 @@ from pipeline.maths.mount_parameters import N_MOUNT
 from pipeline.mount import Mounted, mount_of
 from pipeline.patch_test.bottom_seen import BottomSeen, bottom_seen
 from pipeline.patch_test.coarse_angles import COARSE_DEG, angles_near
+from pipeline.patch_test.contradictions import contradictions
 from pipeline.patch_test.passes import PatchPasses
 
 Array = NDArray[np.float64]
 LEVER_M = 0.05  # standard deviation of a coarse lever arm without a covariance
 SEEN = 0.1  # of what was known beforehand: a parameter with a smaller sigma is seen, an angle to 0.3°
 ROUNDS = 6  # of finding pieces and adjusting
+UNEXPLAINED = 1.5  # a larger variance factor of what passes disagree by is not explained
 STILL = 0.5  # of a sigma: a smaller step ends the rounds
 
 
@@ -48,7 +50,7 @@ class PatchTest:
 
     pieces: those that served; refused: the others; passes: how many saw a piece that served; used: soundings on pieces;
     factor: variance factor of what passes and pieces disagree by, which the covariance has if it is above 1; settled:
-    whether the mount stays when the pieces are found anew.
+    whether the mount stays when the pieces are found anew; contradicted: what of session.yaml is wrong, in words.
     """
 
     mount: Mounted
@@ -60,6 +62,12 @@ class PatchTest:
     used: int
     factor: float
     settled: bool
+    contradicted: Sequence[str]
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether something is wrong that the sigmas do not explain."""
+        return bool(self.contradicted) or self.factor > UNEXPLAINED
 
     @property
     def seen(self) -> NDArray[np.bool_]:
@@ -130,6 +138,7 @@ def patch_test(passes: PatchPasses, head: HeadBefore, mapper: Mapper) -> PatchTe
         used=len(seen.rows),
         factor=adjusted.between.factor,
         settled=settled and adjusted.converged,
+        contradicted=contradictions(problem, adjusted, _known(seen, head), Adjust().test_level),
     )
 
 
@@ -143,10 +152,7 @@ def _problem(
     seen: BottomSeen, passes: PatchPasses, mount: Mounted, head: HeadBefore, mapper: Mapper
 ) -> CalibrationProblem:
     """Return the problem of the soundings on the pieces, which starts from a mount."""
-    surfaces = tuple(
-        ObservedSurface.at(f"bottom-{k}", piece.normal, piece.corners_m.mean(axis=0))
-        for k, piece in enumerate(seen.pieces, start=1)
-    )
+    surfaces = _surfaces(seen)
     names, numbers = tuple(surface.family for surface in surfaces), np.arange(len(surfaces))
     lowest_m = min(float(piece.corners_m[:, 2].min()) for piece in seen.pieces)
     model = ObservationModel(
@@ -157,7 +163,7 @@ def _problem(
         sigmas={"mbes": sensor_sigmas(head.mbes)},
         wet_heights_m=(lowest_m, passes.level_m),
     )
-    coarse = State.at(head.coarse.R_body_from_sensor, head.coarse.lever_arm_body_m, surfaces)
+    coarse = _known(seen, head)
     natural = AsBuilt(offset_sigma_m=0.0, angle_sigma_deg=0.0, bow_sigma_m=0.0)  # a piece is what it is
     depth_m, heads = passes.level_m - lowest_m, {"mbes": head.mbes}
     errors = sonar_errors(coarse.names, head.laser, heads, natural, dict.fromkeys(names, 1.0), depth_m)
@@ -166,6 +172,18 @@ def _problem(
     prior = prior if others is None else prior.with_independent(others)
     beforehand = PriorInformation(passes.noise, parameters=prior, from_start=True)
     return CalibrationProblem(model, beforehand, errors, mapper)
+
+
+def _surfaces(seen: BottomSeen) -> tuple[ObservedSurface, ...]:
+    return tuple(
+        ObservedSurface.at(f"bottom-{k}", piece.normal, piece.corners_m.mean(axis=0))
+        for k, piece in enumerate(seen.pieces, start=1)
+    )
+
+
+def _known(seen: BottomSeen, head: HeadBefore) -> State:
+    """Return the state with all that is known beforehand."""
+    return State.at(head.coarse.R_body_from_sensor, head.coarse.lever_arm_body_m, _surfaces(seen))
 
 
 def _step(before: Mounted, after: Mounted) -> Array:

@@ -105,7 +105,7 @@ def _patch(
     ] = None,
     jobs: Jobs = None,
 ) -> int:
-    """Find the sonar's angles from passes over the bottom alone: a patch test. Status 1 if a run does not agree."""
+    """Find the sonar's angles from passes over the bottom alone: a patch test. Status 1 if they are in doubt."""
     from stages.commands import patch
 
     return patch.command(session, run, water_height, jobs)

@@ -24,7 +24,7 @@ from stages.commands.answer import print_answer
 
 
 def command(folder: Path, run_folder: Path | None, water_height_m: float | None, jobs: int | None) -> int:
-    """Print the angles of each head by passes over the bottom; return 1 if a run's angles do not agree with them.
+    """Print the angles of each head by passes over the bottom; return 1 if they are in doubt, or a run does not agree.
 
     Parameters
     ----------
@@ -47,13 +47,13 @@ def command(folder: Path, run_folder: Path | None, water_height_m: float | None,
     if run is not None and water_height_m is None:
         target = run.settings.pool.target
         water_height_m = target.origin.height_m + target.water_level_m
-    said, agree = [], True
+    said, well = [], True
     with workers(jobs, None) as pool, Progress().shown("reading the soundings, and adjusting the angles"):
         for name, mbes in session.heads.items():
-            text, agrees = _head(folder, session, (name, mbes), run, water_height_m, pool)
+            text, is_well = _head(folder, session, (name, mbes), run, water_height_m, pool)
             said.append(f"{translated('head')} {name}\n\n{text}" if len(session.heads) > 1 else text)
-            agree &= agrees
-    return print_answer("\n\n".join(said), agree)
+            well &= is_well
+    return print_answer("\n\n".join(said), well)
 
 
 def _head(
@@ -64,7 +64,7 @@ def _head(
     water_height_m: float | None,
     pool: Workers,
 ) -> tuple[str, bool]:
-    """Return what is said of one head, and whether the run agrees."""
+    """Return what is said of one head, and whether all is well: nothing is in doubt, and the run agrees."""
     name, mbes = head
     before, beside = HeadBefore.of(session, mbes), of_coarse(HeadBefore.of(session, mbes).coarse)
     if run is not None:
@@ -77,7 +77,7 @@ def _head(
     soundings = Stream(raw_parts("mbes", mbes, folder), pool.map, pool.here)
     passes = read_passes(ins, soundings, session, narrow(SonarPlacement, mbes), water_height_m)
     found = patch_test(passes, before, pool.here)
-    return patch_text(found, beside, passes.read), beside.agrees(found)
+    return patch_text(found, beside, passes.read), beside.agrees(found) and not found.doubtful
 
 
 def _compared(calibrated: dict[str, Any], run: FinishedRun) -> Compared:

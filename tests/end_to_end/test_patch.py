@@ -102,6 +102,16 @@ def test_passes_one_way_at_one_distance_do_not_show_roll(tmp_path: Path) -> None
     assert "Not seen: roll" in told.out
 
 
+def test_a_wrong_sound_speed_is_named_and_its_angles_are_in_doubt(tmp_path: Path) -> None:
+    """One per cent turns roll by a third of a degree, twenty of its sigmas: nothing of that may look right."""
+    session = simulate(tmp_path / "session", 8, **bottom(-3.5), mbes={"sound_speed_true_m_s": 1485.0})
+    told = patched(session)
+    said = " ".join(told.out.split())
+    assert told.status == 1, told.out
+    assert re.search(r"The soundings contradict session.yaml: the sound speed: it is -(0.9\d*|1.0\d*) ± 0.\d+ % ", said)
+    assert "Do not use these angles before that is mended." in said
+
+
 def test_refusals_say_what_to_do(sloping: Path, tmp_path: Path) -> None:
     cast = tmp_path / "cast"
     shutil.copytree(sloping, cast)
