@@ -133,6 +133,7 @@ montecarlo: $(SETUP) ## many simulated sessions: are the predicted sigmas true?
 	$(PY) -m tools.laser_pairs
 	$(PY) -m tools.two_heads
 	$(PY) -m tools.stress
+	$(PY) -m tools.course_campaigns > docs/accuracy/courses.md
 	$(PY) -m tools.place_campaign > docs/accuracy/places.md
 	$(PY) -m tools.place_campaign --rough --only slip > docs/accuracy/walls.md
 	$(PY) -m tools.patch_campaign > docs/accuracy/patch.md
