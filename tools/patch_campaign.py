@@ -51,7 +51,6 @@ EXPLAINED = """
 The normalised squared error (NSE) of angles and lever arm by the total covariance is 6 in the mean if the sigmas are
 true. "Seen in": the number of sessions in which pitch, roll, yaw is seen, that is, to 0.3° or better.
 """
-COLUMNS = ("error", "sigma", "seen")
 
 
 def row_of(task: tuple[str, int]) -> dict[str, Any]:
@@ -77,11 +76,10 @@ def row_of(task: tuple[str, int]) -> dict[str, Any]:
     true = np.array(truth["R_body_from_mbes"]), np.array(truth["lever_arm_m"])
     error = mount_error(*true, found.mount.R_body_from_sensor, found.mount.lever_arm_body_m)
     units = np.repeat([np.degrees(1.0), 1000.0], 3)
-    row: dict[str, Any] = {"kind": kind, "seed": seed, "settled": found.settled, "pieces": len(found.pieces)}
-    for name, e, sigma, seen in zip(
-        NAMES, error * units, np.sqrt(np.diag(found.covariance)) * units, found.seen, strict=True
-    ):
-        row |= {f"error_{name}": float(e), f"sigma_{name}": float(sigma), f"seen_{name}": bool(seen)}
+    row: dict[str, Any] = {"kind": kind, "seed": seed, "settled": found.settled, "pieces": len(found.seen.pieces)}
+    for name, e, sigma in zip(NAMES, error * units, np.sqrt(np.diag(found.covariance)) * units, strict=True):
+        row |= {f"error_{name}": float(e), f"sigma_{name}": float(sigma)}
+    row |= {f"seen_{name}": found.sees(f"{name}_deg") for name in NAMES[:3]} | {"doubtful": found.doubtful}
     return row | {"nse": float(error @ np.linalg.solve(found.covariance, error))}
 
 
@@ -89,18 +87,19 @@ def page(table: pd.DataFrame) -> str:
     """Return the page in Markdown."""
     heads = (
         "bottom", "mean NSE (99 % band)", f"RMS error: {', '.join(NAMES)} (°, mm)", "median sigma",
-        "RMS of error ÷ sigma", "worst of an angle", "seen in", "not settled",
+        "RMS of error ÷ sigma", "worst of an angle", "seen in", "in doubt",
     )  # fmt: skip
     lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
     for kind, rows in table.groupby("kind", sort=False):
-        errors, sigmas, seen = (rows[[f"{what}_{name}" for name in NAMES]].to_numpy(float) for what in COLUMNS)
+        errors, sigmas = (rows[[f"{what}_{name}" for name in NAMES]].to_numpy(float) for what in ("error", "sigma"))
+        seen = rows[[f"seen_{name}" for name in NAMES[:3]]].to_numpy(int).sum(axis=0)
         low, high = nse_band(len(rows))
         z = errors / sigmas
         cells = (
             str(kind), f"{rows['nse'].mean():.2f} ({low:.2f} to {high:.2f})", _sizes(np.sqrt((errors**2).mean(axis=0))),
             _sizes(np.median(sigmas, axis=0)), ", ".join(f"{size:.2f}" for size in np.sqrt((z**2).mean(axis=0))),
-            f"{np.abs(z[:, :3]).max():.1f}", ", ".join(f"{int(count)}" for count in seen[:, :3].sum(axis=0)),
-            str(int((~rows["settled"]).sum())),
+            f"{np.abs(z[:, :3]).max():.1f}", ", ".join(f"{count}" for count in seen),
+            str(int(rows["doubtful"].sum())),
         )  # fmt: skip
         lines.append(f"| {' | '.join(cells)} |")
     return HEAD.format(sessions=int(table.groupby("kind").size().max())) + "\n".join(lines) + "\n" + EXPLAINED

@@ -3,8 +3,9 @@
 Every piece is a plane of its own, of which nothing is known, as the boat saw it from passes both ways or at different
 distances. The model is that of a calibration (:mod:`pipeline.adjustment.observation_model`) without the laser. So the
 INS's drift, the sonar's small errors and all covariances are the calibration's, too. The coarse mount joins in as what
-is known beforehand: its angles by 3°, its lever arm as surveyed. A parameter of which the passes tell nothing keeps
-that value and that sigma, instead of making the equations singular; its error is in the other sigmas.
+is known beforehand: its angles by 3°, its lever arm as surveyed. An angle of which the passes tell nothing keeps that
+value and that sigma, instead of making the equations singular. The angles of the result are those that belong to the
+lever arm as it is known (:mod:`pipeline.patch_test.held_arm`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.adjustment.consider import known_parameters, sonar_errors
+from pipeline.adjustment.ins_drift import drift_figures_table
 from pipeline.adjustment.iteration import adjust_mount
 from pipeline.adjustment.observation_model import ObservationModel
 from pipeline.adjustment.problem import CalibrationProblem, PriorInformation, sensor_sigmas
@@ -22,7 +24,6 @@ from pipeline.artefacts.to_tables import xyz_columns
 from pipeline.config.mount import Mount
 from pipeline.config.pool import Adjust, AsBuilt, Ingest
 from pipeline.config.session import Laser, Mbes, SessionConfig
-from pipeline.finding.bottom import BottomPiece
 from pipeline.maths.adjustment.body_motion import BodyMotion
 from pipeline.maths.adjustment.face_shifts import Faces
 from pipeline.maths.adjustment.observed_surface import ObservedSurface
@@ -34,45 +35,51 @@ from pipeline.mount import Mounted, mount_of
 from pipeline.patch_test.bottom_seen import BottomSeen, bottom_seen
 from pipeline.patch_test.coarse_angles import COARSE_DEG, angles_near
 from pipeline.patch_test.contradictions import contradictions
+from pipeline.patch_test.held_arm import with_arm_held
 from pipeline.patch_test.passes import PatchPasses
+from pipeline.report.drift_check import figures_disagree
 
 Array = NDArray[np.float64]
-LEVER_M = 0.05  # standard deviation of a coarse lever arm without a covariance
-SEEN = 0.1  # of what was known beforehand: a parameter with a smaller sigma is seen, an angle to 0.3°
-ROUNDS = 6  # of finding pieces and adjusting
+LEVER_M = 0.02  # standard deviation of a surveyed lever arm without a covariance
+SEEN = 0.1  # of what was known beforehand: an angle with a smaller sigma is seen, to 0.3°
+ROUNDS, CHOSEN = 8, 3  # of finding pieces and adjusting; from this one on no square joins in
+FEWEST, DIFFERING = 3, 1 / 3  # pieces; largest share of flat squares on which the passes differ by too much
 UNEXPLAINED = 1.5  # a larger variance factor of what passes disagree by is not explained
 STILL = 0.5  # of a sigma: a smaller step ends the rounds
 
 
 @dataclass(frozen=True)
 class PatchTest:
-    """What the passes say: the mount, its total covariance (6, 6), and what was known beforehand of it (6, 6).
+    """What the passes say: the mount with the lever arm as known, its total covariance (6, 6), that known beforehand.
 
-    pieces: those that served; refused: the others; passes: how many saw a piece that served; used: soundings on pieces;
-    factor: variance factor of what passes and pieces disagree by, which the covariance has if it is above 1; settled:
-    whether the mount stays when the pieces are found anew; contradicted: what of session.yaml is wrong, in words.
+    seen: the bottom, as it was used; passes: how many saw a piece that was used, of those sailed; with_cast: whether a
+    cast bent the rays; factor: variance factor of what passes and pieces disagree by; settled: whether the mount stays
+    when the pieces are found anew; contradicted: what of session.yaml is wrong, in words; drift: what is said of the
+    INS's drift, "" for nothing.
     """
 
     mount: Mounted
     covariance: Array
     known: Array
-    pieces: Sequence[BottomPiece]
-    refused: Sequence[BottomPiece]
+    seen: BottomSeen
     passes: int
-    used: int
+    sailed: int
+    with_cast: bool
     factor: float
     settled: bool
     contradicted: Sequence[str]
+    drift: str
 
     @property
     def doubtful(self) -> bool:
         """Whether something is wrong that the sigmas do not explain."""
-        return bool(self.contradicted) or self.factor > UNEXPLAINED
+        disagree = self.factor > UNEXPLAINED or self.seen.differing > DIFFERING
+        return bool(self.contradicted) or disagree or not self.settled or len(self.seen.pieces) < FEWEST
 
-    @property
-    def seen(self) -> NDArray[np.bool_]:
-        """Which (6,) of the parameters the passes tell of, in the order of the mount parameters, body axes."""
-        return np.asarray(np.sqrt(np.diag(self.covariance)) < SEEN * np.sqrt(np.diag(self.known)))
+    def sees(self, key: str) -> bool:
+        """Return whether the passes tell of an angle, by its key in session.yaml."""
+        before, after = (self.mount.sigmas(one)[key] for one in (self.known, self.covariance))
+        return after < SEEN * before
 
 
 @dataclass(frozen=True)
@@ -96,7 +103,7 @@ class HeadBefore:
         return cls(mount_of(mbes.mount), known, session.laser, mbes)
 
     def with_lever_arm(self, mount: Mapping[str, float], covariance: Array) -> "HeadBefore":
-        """Return the same with the mount of a calibration: its lever arm with the covariance (3, 3); coarse angles."""
+        """Return the same from the mount of a calibration, whose lever arm has a covariance (3, 3)."""
         known = self.known.copy()
         known[3:, 3:] = covariance
         return replace(self, coarse=mount_of(Mount(**mount)), known=known)
@@ -119,26 +126,29 @@ def patch_test(passes: PatchPasses, head: HeadBefore, mapper: Mapper) -> PatchTe
     RawDataError
         No piece of the bottom serves, or the passes would turn the mount too far.
     """
-    mount, rounds, settled = angles_near(passes, head.coarse), 0, False
+    mount, rounds, settled, among = angles_near(passes, head.coarse), 0, False, None
     while not settled and rounds < ROUNDS:
         rounds, before = rounds + 1, mount
-        seen = bottom_seen(passes, mount)
+        seen = bottom_seen(passes, mount, among)
+        among = seen.pieces if rounds >= CHOSEN else None
         problem = _problem(seen, passes, mount, head, mapper)
         adjusted = adjust_mount(problem, {"mbes": _labelled(seen, passes)}, Adjust(), Ingest().max_gap_s)
-        covariance = adjusted.solution.total_covariance(problem.consider, np.arange(N_MOUNT))
-        mount = Mounted(adjusted.state.R_body_from_sensor, adjusted.state.lever_arm_m)
-        settled = bool(np.all(np.abs(_step(before, mount)) < STILL * np.sqrt(np.diag(covariance))))
+        held = with_arm_held(adjusted, problem, head.coarse.lever_arm_body_m, head.known[3:, 3:])
+        mount, sigma = held.mount, np.sqrt(np.diag(held.covariance))[:3]
+        settled = bool(np.all(np.abs(_turn(before, mount)) < STILL * sigma))
+    drift = figures_disagree(drift_figures_table(passes.noise, adjusted.drift_figures))
     return PatchTest(
         mount=mount,
-        covariance=covariance * max(adjusted.between.factor, 1.0),
+        covariance=held.covariance + max(adjusted.between.factor - 1.0, 0.0) * held.noise,
         known=head.known,
-        pieces=seen.pieces,
-        refused=seen.refused,
+        seen=seen,
         passes=len(set().union(*(piece.passes for piece in seen.pieces))),
-        used=len(seen.rows),
+        sailed=len(passes.context.starts_ns),
+        with_cast=head.mbes.svp is not None,
         factor=adjusted.between.factor,
         settled=settled and adjusted.converged,
         contradicted=contradictions(problem, adjusted, _known(seen, head), Adjust().test_level),
+        drift="" if drift is None else drift.words,
     )
 
 
@@ -170,7 +180,7 @@ def _problem(
     prior = ParameterPrior(np.arange(N_MOUNT), head.known, coarse)
     others = known_parameters(coarse, errors, ())
     prior = prior if others is None else prior.with_independent(others)
-    beforehand = PriorInformation(passes.noise, parameters=prior, from_start=True)
+    beforehand = PriorInformation(passes.noise, drift=passes.drift, parameters=prior, from_start=True)
     return CalibrationProblem(model, beforehand, errors, mapper)
 
 
@@ -186,7 +196,6 @@ def _known(seen: BottomSeen, head: HeadBefore) -> State:
     return State.at(head.coarse.R_body_from_sensor, head.coarse.lever_arm_body_m, _surfaces(seen))
 
 
-def _step(before: Mounted, after: Mounted) -> Array:
-    """Return the change of a mount, (6,) rad and m, body axes."""
-    turn = log_so3(after.R_body_from_sensor @ before.R_body_from_sensor.T)
-    return np.concatenate([turn, after.lever_arm_body_m - before.lever_arm_body_m])
+def _turn(before: Mounted, after: Mounted) -> Array:
+    """Return the rotation vector (3,) rad, body axes, from one mount to another."""
+    return log_so3(after.R_body_from_sensor @ before.R_body_from_sensor.T)

@@ -1,14 +1,15 @@
 """``poolcal patch``: the sonar's angles by passes over the bottom alone, and whether a run agrees with them."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from pipeline.artefacts.streams import Stream
-from pipeline.config.load import load_session
+from pipeline.config.load import session_in, session_yaml
 from pipeline.config.session import Mbes, SessionConfig
 from pipeline.config.stage_settings import SonarPlacement, narrow
+from pipeline.config.yaml_file import YamlFile
+from pipeline.console import plural
 from pipeline.errors import ConfigError
 from pipeline.language.chosen import translated
 from pipeline.patch_test.passes import read_passes
@@ -16,6 +17,7 @@ from pipeline.patch_test.patch_text import Compared, of_coarse, patch_text
 from pipeline.patch_test.solve import HeadBefore, patch_test
 from pipeline.readers.casts import with_cast
 from pipeline.readers.dispatch import raw_parts
+from pipeline.report.reason_codes import WEAK_ALONE
 from pipeline.results.finished_run import FinishedRun
 from pipeline.run.progress import Progress
 from pipeline.run.workers import Workers, workers
@@ -37,16 +39,15 @@ def command(folder: Path, run_folder: Path | None, water_height_m: float | None,
     jobs
         Number of workers.
     """
-    session = load_session(folder, with_cast)
-    run = None if run_folder is None else FinishedRun.read(run_folder, ORDER, several_heads=True)
-    if session.sonar.svp is not None and water_height_m is None and run is None:
-        raise ConfigError(
-            "--water-height: is missing: mbes.svp counts depths from the water; give its height in the INS's datum, or "
-            "--run RUN, which has it"
-        )
-    if run is not None and water_height_m is None:
+    session = session_in(YamlFile.read(session_yaml(folder)), with_cast, several_heads=True)
+    run = None if run_folder is None else _run(run_folder, session)
+    if run is not None and water_height_m is None and run.settings.session_folder.resolve() == folder.resolve():
         target = run.settings.pool.target
         water_height_m = target.origin.height_m + target.water_level_m
+    if session.sonar.svp is not None and water_height_m is None:
+        raise ConfigError(
+            "--water-height: is missing: mbes.svp counts depths from the water; give its height in the INS's datum"
+        )
     said, well = [], True
     with workers(jobs, None) as pool, Progress().shown("reading the soundings, and adjusting the angles"):
         for name, mbes in session.heads.items():
@@ -66,12 +67,11 @@ def _head(
 ) -> tuple[str, bool]:
     """Return what is said of one head, and whether all is well: nothing is in doubt, and the run agrees."""
     name, mbes = head
-    before, beside = HeadBefore.of(session, mbes), of_coarse(HeadBefore.of(session, mbes).coarse)
+    before = HeadBefore.of(session, mbes)
+    beside = of_coarse(before.coarse)
     if run is not None:
-        if name not in run.heads:
-            raise ConfigError(f"--run {run.path}: has no head {name}; name a run of this boat")
         calibrated = run.of_head(name).result["methods"]["adjustment"]
-        beside = _compared(calibrated, run)
+        beside = Compared(run.path.name, calibrated["mount"], np.array(calibrated["covariance_total"]))
         before = before.with_lever_arm(calibrated["mount"], np.array(calibrated["covariance_total"])[3:, 3:])
     ins = Stream(raw_parts("ins", session.ins, folder), pool.map, pool.here)
     soundings = Stream(raw_parts("mbes", mbes, folder), pool.map, pool.here)
@@ -80,7 +80,18 @@ def _head(
     return patch_text(found, beside, passes.read), beside.agrees(found) and not found.doubtful
 
 
-def _compared(calibrated: dict[str, Any], run: FinishedRun) -> Compared:
-    if calibrated["mount"] is None:
-        raise ConfigError(f"--run {run.path}: has no result to be compared; name an accepted run")
-    return Compared(run.path.name, calibrated["mount"], np.array(calibrated["covariance_total"]))
+def _run(path: Path, session: SessionConfig) -> FinishedRun:
+    """Return a run whose mounts can be compared with this session's heads; else raise ConfigError."""
+    run = FinishedRun.read(path, ORDER, several_heads=True)
+    if len(run.heads) != len(session.heads):
+        raise ConfigError(
+            f"--run {path}: has {plural(len(run.heads), 'head')}, this session {len(session.heads)}; name a run of "
+            "this boat with the same heads"
+        )
+    grave = [code for code in run.result["reason_codes"] if code not in WEAK_ALONE]
+    if grave:
+        raise ConfigError(
+            f"--run {path}: was rejected for {', '.join(dict.fromkeys(grave))}: its lever arm, which the patch test "
+            "takes from it, may be wrong; mend that first"
+        )
+    return run

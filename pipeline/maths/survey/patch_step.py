@@ -10,7 +10,8 @@ misfit is v = z - a x - b y - α, and with m = (-a, -b, 1)
 α, a, b of each piece are unknown: of v and of g only what no plane over the piece takes up counts. So a level bottom
 tells of roll by u square to the pass, which changes its sign with the pass, of pitch in the same way by u along it, and
 of yaw nothing: g of yaw is u × m along the vertical, which is the slope times the distance. The lever arm is taken as
-known, and poses as true: the step leads near enough for an adjustment.
+known, and poses as true: the step leads near enough for an adjustment. A piece that fits much worse than most
+(something stood there in one pass) does not count.
 """
 
 from collections.abc import Iterable
@@ -20,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-CUT = 3.0  # RMS of a piece; soundings farther from its plane do not count
+CUT, ROUNDS = 3.0, 4  # RMS beyond which a sounding does not count on its piece, and a piece not among all; of these
 
 
 @dataclass(frozen=True)
@@ -46,18 +47,27 @@ def patch_step(pieces: Iterable[PieceSoundings], noise_m: float, known_rad: floa
     turned_rad
         Rotation vector (3,) by which the mount has been turned from what is known beforehand.
     """
-    normal = np.eye(3) * (noise_m / known_rad) ** 2
-    right = normal @ turned_rad
-    for piece in pieces:
-        about_mean, height = piece.places_m[:, :2] - piece.places_m[:, :2].mean(axis=0), piece.places_m[:, 2]
-        plane = np.column_stack([about_mean, np.ones(len(height))])
-        off = height - plane @ np.linalg.lstsq(plane, height, rcond=None)[0]
-        use = np.abs(off) <= CUT * np.sqrt(np.mean(off**2))
-        plane, height = plane[use], height[use]
-        a, b, _ = np.linalg.lstsq(plane, height, rcond=None)[0]
-        turned = np.cross(piece.from_head_m[use], np.array([-a, -b, 1.0]))
-        both = np.column_stack([np.einsum("nji,nj->ni", piece.R_level_from_body[use], turned), height])
-        left = both - plane @ np.linalg.lstsq(plane, both, rcond=None)[0]
-        normal += left[:, :3].T @ left[:, :3] / len(left)
-        right += left[:, :3].T @ left[:, 3] / len(left)
-    return np.asarray(-np.linalg.solve(normal, right))
+    sums = np.array([_sums(piece) for piece in pieces])
+    beforehand = np.column_stack([np.eye(3), turned_rad]) * (noise_m / known_rad) ** 2
+    use = np.ones(len(sums), dtype=bool)
+    for _ in range(ROUNDS):
+        of_all = beforehand + sums[use, :3].sum(axis=0)
+        step = -np.linalg.solve(of_all[:, :3], of_all[:, 3])
+        both = np.append(step, 1.0)
+        squares = np.einsum("pij,i,j->p", sums, both, both)
+        use = squares <= CUT**2 * np.median(squares)
+    return np.asarray(step)
+
+
+def _sums(piece: PieceSoundings) -> Array:
+    """Return the mean products (4, 4) of g and v on a piece, without what a plane takes up."""
+    about_mean, height = piece.places_m[:, :2] - piece.places_m[:, :2].mean(axis=0), piece.places_m[:, 2]
+    plane = np.column_stack([about_mean, np.ones(len(height))])
+    off = height - plane @ np.linalg.lstsq(plane, height, rcond=None)[0]
+    use = np.abs(off) <= CUT * np.sqrt(np.mean(off**2))
+    plane, height = plane[use], height[use]
+    a, b, _ = np.linalg.lstsq(plane, height, rcond=None)[0]
+    turned = np.cross(piece.from_head_m[use], np.array([-a, -b, 1.0]))
+    both = np.column_stack([np.einsum("nji,nj->ni", piece.R_level_from_body[use], turned), height])
+    left = both - plane @ np.linalg.lstsq(plane, both, rcond=None)[0]
+    return np.asarray(left.T @ left / len(left))
