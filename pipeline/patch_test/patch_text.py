@@ -47,8 +47,9 @@ class Compared:
         }
 
     def agrees(self, found: PatchTest) -> bool:
-        """Return whether no angle differs by more than chance explains."""
-        return all(abs(apart) <= AGREE * sigma for apart, sigma in self.differences(found).values())
+        """Return whether there are angles to be compared, and none differs by more than chance explains."""
+        differences = self.differences(found).values()
+        return bool(differences) and all(abs(apart) <= AGREE * sigma for apart, sigma in differences)
 
 
 def patch_text(found: PatchTest, beside: Compared, read: int) -> str:
@@ -98,20 +99,19 @@ def _sentences(found: PatchTest, beside: Compared) -> list[str]:
     ]
     if found.drift and not found.contradicted:
         said.append(f"But {found.drift}.")
-    if beside.covariance is not None and len(unseen) < len(ANGLES) and not found.doubtful:
-        said.append(
-            f"{beside.words} and the passes agree." if beside.agrees(found) else
-            f"{beside.words} and the passes do not agree: do not enter these angles before you know why."
-        )  # fmt: skip
-    return said
+    if beside.covariance is None or found.doubtful:
+        return said
+    if len(unseen) == len(ANGLES):
+        return [*said, f"No angle is seen: nothing of {beside.words} can be compared."]
+    if beside.agrees(found):
+        return [*said, f"{beside.words} and the passes agree."]
+    return [*said, f"{beside.words} and the passes do not agree: do not enter these angles before you know why."]
 
 
 def _doubts(found: PatchTest) -> list[str]:
     """Return sentences on what is wrong, if something is."""
-    words = [
-        f"The soundings contradict session.yaml: {cause}." if first else f"Or, nearly as likely: {cause}."
-        for first, cause in zip((True, *[False] * len(found.contradicted)), found.contradicted, strict=False)
-    ]
+    words = [f"The soundings contradict session.yaml: {cause}." for cause in found.contradicted[:1]]
+    words += [f"Or, nearly as likely: {cause}." for cause in found.contradicted[1:]]
     if found.factor > UNEXPLAINED:
         words.append(
             f"The passes disagree by {np.sqrt(found.factor):.1f} times what the sigmas in session.yaml explain, and so "
