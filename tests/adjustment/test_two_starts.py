@@ -93,7 +93,7 @@ def test_several_heads_at_one_wall_are_in_doubt(monkeypatch: pytest.MonkeyPatch)
     first = weighted_iteration(unsurveyed(model), streams, Adjust(), 5.0)
     monkeypatch.setattr(two_starts, "weighted_iteration", lambda *_: first)
     two_heads = SimpleNamespace(
-        prior=SimpleNamespace(from_start=True), model=SimpleNamespace(coarse=SimpleNamespace(heads=("mbes", "mbes_2")))
+        prior=unsurveyed(model).prior, model=SimpleNamespace(coarse=SimpleNamespace(heads=("mbes", "mbes_2"), mounts=[]))
     )
     chosen = chosen_iteration(cast(Any, two_heads), streams, Adjust(), 5.0)
     assert chosen.weighted is first
