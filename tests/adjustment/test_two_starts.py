@@ -92,9 +92,8 @@ def test_several_heads_at_one_wall_are_in_doubt(monkeypatch: pytest.MonkeyPatch)
     streams, model = made_of_wall(3, NOISY)
     first = weighted_iteration(unsurveyed(model), streams, Adjust(), 5.0)
     monkeypatch.setattr(two_starts, "weighted_iteration", lambda *_: first)
-    two_heads = SimpleNamespace(
-        prior=unsurveyed(model).prior, model=SimpleNamespace(coarse=SimpleNamespace(heads=("mbes", "mbes_2"), mounts=[]))
-    )
+    coarse = SimpleNamespace(heads=("mbes", "mbes_2"), mounts=[])
+    two_heads = SimpleNamespace(prior=unsurveyed(model).prior, model=SimpleNamespace(coarse=coarse))
     chosen = chosen_iteration(cast(Any, two_heads), streams, Adjust(), 5.0)
     assert chosen.weighted is first
     assert chosen.rival is not None

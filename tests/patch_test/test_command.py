@@ -39,7 +39,7 @@ def bottom(north_m: float) -> dict[str, Any]:
     }
     return of_faces(faces, azimuth_deg=163.0) | {
         "track": {
-            "distances_m": [12.0, 3.0, 10.0, 5.0], "courses": ["along", "back"], "half_length_m": 9.0, "speed_m_s": 0.8,
+            "distances_m": [12.0, 3.0, 10.0, 5.0], "courses": ["along", "back"], "half_length_m": 9.0, "speed_m_s": 1.2,
         },
         "laser": {"point_rate_hz": 500.0, "line_rate_hz": 20.0, "format": "las"},
     }  # fmt: skip
