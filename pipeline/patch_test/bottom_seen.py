@@ -38,8 +38,10 @@ class BottomSeen:
         return differ / (differ + len(self.pieces) + sum(not piece.refused for piece in self.others))
 
 
-def bottom_seen(passes: PatchPasses, mount: Mounted, among: Sequence[BottomPiece] | None = None) -> BottomSeen:
-    """Return the bottom by a mount; ``among``: only squares of these pieces are used.
+def bottom_seen(
+    passes: PatchPasses, mount: Mounted, squares: Squares, among: Sequence[BottomPiece] | None = None
+) -> BottomSeen:
+    """Return the bottom by a mount, divided into squares; ``among``: only squares of these pieces are used.
 
     Raises
     ------
@@ -47,7 +49,6 @@ def bottom_seen(passes: PatchPasses, mount: Mounted, among: Sequence[BottomPiece
         No piece serves.
     """
     own, level = passes.placed(mount)
-    squares = squares_of(passes, level)
     found = bottom_pieces(level, passes.number_of_pass, passes.level_m, squares)
     squares_used = None if among is None else {_square(piece) for piece in among}
     pieces = serving([one for one in found if squares_used is None or _square(one) in squares_used], STEEPEST)
@@ -67,7 +68,7 @@ def _square(piece: BottomPiece) -> tuple[float, ...]:
 
 
 def squares_of(passes: PatchPasses, level_m: Array) -> Squares:
-    """Return the squares for a depth, by steps of √2 of their side: the same for each mount that is tried."""
+    """Return the squares for the depth of soundings (n, 3), by steps of √2 of their side."""
     depth_m = passes.level_m - float(np.nanmedian(level_m[:, 2]))
     steps = round(2 * float(np.log2(max(SIDE * depth_m / SIDE_M, 1.0))))
     return Squares.of(float(SIDE_M * 2.0 ** (steps / 2)))

@@ -86,7 +86,7 @@ def read_passes(
             f"mbes: none of {read:,} soundings lies within the time of the INS, between records no more than "
             f"{MAX_INTERVAL_NS / NS:g} s apart; look at the clocks"
         )
-    context = _with_passes(context, np.unique(sample["t_ns"]))
+    context = with_passes(context, np.unique(sample["t_ns"]))
     number = pass_of(sample["t_ns"], context.starts_ns, context.ends_ns)
     rows = np.flatnonzero(number >= 0)
     return PatchPasses(
@@ -109,7 +109,7 @@ def _drawn(batch: Batch, context: PoolContext) -> tuple[int, Columns]:
     return len(t_ns), columns | {"drawn": scattered(t_ns[rows])}
 
 
-def _with_passes(context: PoolContext, ping_t_ns: NDArray[np.int64]) -> PoolContext:
+def with_passes(context: PoolContext, ping_t_ns: NDArray[np.int64]) -> PoolContext:
     """Return the context with the passes: the boat turns back along their direction, or the records have a gap.
 
     Passes lead both ways, so their direction is half the mean of the doubled directions of the boat's steps of a

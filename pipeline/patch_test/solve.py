@@ -32,7 +32,7 @@ from pipeline.maths.adjustment.pseudo_observations import ParameterPrior
 from pipeline.maths.geometry.rotations import log_so3
 from pipeline.maths.mount_parameters import N_MOUNT
 from pipeline.mount import Mounted, mount_of
-from pipeline.patch_test.bottom_seen import BottomSeen, bottom_seen
+from pipeline.patch_test.bottom_seen import BottomSeen, bottom_seen, squares_of
 from pipeline.patch_test.coarse_angles import COARSE_DEG, angles_near
 from pipeline.patch_test.contradictions import contradictions
 from pipeline.patch_test.held_arm import with_arm_held
@@ -127,9 +127,10 @@ def patch_test(passes: PatchPasses, head: HeadBefore, mapper: Mapper) -> PatchTe
         No piece of the bottom serves, or the passes would turn the mount too far.
     """
     mount, rounds, settled, among = angles_near(passes, head.coarse), 0, False, None
+    squares = squares_of(passes, passes.placed(mount)[1])
     while not settled and rounds < ROUNDS:
         rounds, before = rounds + 1, mount
-        seen = bottom_seen(passes, mount, among)
+        seen = bottom_seen(passes, mount, squares, among)
         among = seen.pieces if rounds >= CHOSEN else None
         problem = _problem(seen, passes, mount, head, mapper)
         adjusted = adjust_mount(problem, {"mbes": _labelled(seen, passes)}, Adjust(), Ingest().max_gap_s)
