@@ -1,7 +1,7 @@
 """Patch tests over a bottom, without a target: whether their angles are as right as they are said to be.
 
 Each session is the scenario ``patch_test``, over its slope or over a bottom that is level all over, with all errors of
-the sonar drawn by their sigmas, angles of the coarse mount wrong by 2.5°, and its lever arm by 5 cm (1 sigma) on each
+the sonar drawn by their sigmas, angles of the coarse mount wrong by 2.5°, and its lever arm by 2 cm (1 sigma) on each
 axis. Its rows stand in runs/patch/ (``tools.campaign_files``).
 
     python -m tools.patch_campaign [--sessions 60] [--jobs 2] [--resume] > FILE.md
@@ -43,7 +43,7 @@ HEAD = """# Patch tests
 Made by `python -m tools.patch_campaign`, {sessions} sessions of each kind. Each is four passes over a bottom of 14 m by
 20 m, 6 m deep, both ways, by a boat whose head looks to starboard: with a slope of 17° along the passes, or level all
 over. The INS drifts; all errors of the sonar are drawn by their sigmas; the coarse angles are wrong by 2.5°, the lever
-arm by 5 cm (1 sigma) on each axis, which nobody knows.
+arm by 2 cm (1 sigma) on each axis, which nobody knows.
 
 """
 
