@@ -44,11 +44,17 @@ brackets the band of its mean with 99 % probability; σ is the total sigma.
 
 def page() -> str:
     """Return the page in Markdown, from the rows on disk."""
-    lines = [HEAD, "|---" + "|---:" * (HEAD.count("|") - 2) + "|"]
+    lines, others = [HEAD, "|---" + "|---:" * (HEAD.count("|") - 2) + "|"], []
     for campaign in COURSES:
         table = pd.read_parquet(path_of(campaign))
         totals = {f"sigma_{name}": table[f"total_{name}"] for name in NAMES}
-        lines.append(markdown_row(campaign.name, statistics_of(table.assign(**totals, nse=table["nse_total"]))))
+        honest = table["accepted"] | table["reasons"].str.startswith("total sigma")
+        judged = table.assign(**totals, nse=table["nse_total"])
+        lines.append(markdown_row(campaign.name, statistics_of(judged[honest])))
+        wrong = judged.loc[~honest, "nse"].sort_values()
+        if len(wrong):
+            others.append(f"* {campaign.name}: {len(wrong)}, their NSE {', '.join(f'{nse:.0f}' for nse in wrong)}")
+    lines += ["", "Not in the table, because rejected for another reason than their sigmas:", "", *others]
     return PAGE + "\n".join(lines) + "\n"
 
 
