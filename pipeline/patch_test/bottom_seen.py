@@ -50,8 +50,8 @@ def bottom_seen(
     """
     own, level = passes.placed(mount)
     found = bottom_pieces(level, passes.number_of_pass, passes.level_m, squares)
-    squares_used = None if among is None else {_square(piece) for piece in among}
-    pieces = serving([one for one in found if squares_used is None or _square(one) in squares_used], STEEPEST)
+    squares_used = None if among is None else {square_of(piece) for piece in among}
+    pieces = serving([one for one in found if squares_used is None or square_of(one) in squares_used], STEEPEST)
     if not pieces:
         raise RawDataError(f"mbes: no piece of the bottom serves a patch test: {_why_none(found, squares.side_m)}")
     on = np.full(len(level), -1, dtype=np.int16)
@@ -63,7 +63,8 @@ def bottom_seen(
     return BottomSeen(pieces, others, rows, on[rows], own[rows], level[rows])
 
 
-def _square(piece: BottomPiece) -> tuple[float, ...]:
+def square_of(piece: BottomPiece) -> tuple[float, ...]:
+    """Return the place of a piece's square, the same whichever passes showed it."""
     return tuple(np.round(piece.corners_m[0, :2], 3).tolist())
 
 

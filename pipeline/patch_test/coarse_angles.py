@@ -15,7 +15,7 @@ from pipeline.finding.bottom import bottom_pieces
 from pipeline.maths.geometry.rotations import exp_so3, log_so3
 from pipeline.maths.survey.patch_step import PieceSoundings, patch_step
 from pipeline.mount import Mounted
-from pipeline.patch_test.bottom_seen import rows_on, squares_of
+from pipeline.patch_test.bottom_seen import rows_on, square_of, squares_of
 from pipeline.patch_test.passes import PatchPasses
 
 Array = NDArray[np.float64]
@@ -55,13 +55,12 @@ def _soundings(passes: PatchPasses, mount: Mounted) -> list[PieceSoundings]:
     """Return the soundings on each square that is flat in two passes or more."""
     own, level = passes.placed(mount)
     squares = replace(squares_of(passes, level), passes=1)
-    rows: dict[tuple[int, ...], list[NDArray[np.int64]]] = {}
+    rows: dict[tuple[float, ...], list[NDArray[np.int64]]] = {}
     for number in np.unique(passes.number_of_pass).tolist():
         of_pass = np.flatnonzero(passes.number_of_pass == number)
         for piece in bottom_pieces(level[of_pass], passes.number_of_pass[of_pass], passes.level_m, squares):
             if not piece.refused:
-                square = np.floor(piece.corners_m[:, :2].mean(axis=0) / squares.side_m).astype(int).tolist()
-                rows.setdefault(tuple(square), []).append(rows_on(piece, level, of_pass))
+                rows.setdefault(square_of(piece), []).append(rows_on(piece, level, of_pass))
     shared = [np.concatenate(found) for found in rows.values() if len(found) > 1]
     if not shared:
         raise RawDataError(

@@ -7,6 +7,7 @@ from typing import Any
 
 from pipeline.config.session import Calibrated
 from pipeline.errors import ArtefactError
+from pipeline.report.reason_codes import WEAK_ALONE
 from pipeline.results.screen import summary
 from pipeline.results.session_estimate import session_estimate
 from pipeline.run import manifest
@@ -67,6 +68,11 @@ class FinishedRun:
     def heads(self) -> tuple[str, ...]:
         """Names of the sonar's heads, the first one first; of one head its name alone."""
         return tuple(str(block["name"]) for block in self.result.get("heads", ())) or ("mbes",)
+
+    @property
+    def grave_reasons(self) -> tuple[str, ...]:
+        """Codes of the reasons that say that something is wrong, each once: not only that a sigma is too large."""
+        return tuple(dict.fromkeys(code for code in self.result["reason_codes"] if code not in WEAK_ALONE))
 
     @property
     def tables(self) -> Tables:

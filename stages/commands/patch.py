@@ -17,7 +17,6 @@ from pipeline.patch_test.patch_text import Compared, of_coarse, patch_text
 from pipeline.patch_test.solve import HeadBefore, patch_test
 from pipeline.readers.casts import with_cast
 from pipeline.readers.dispatch import raw_parts
-from pipeline.report.reason_codes import WEAK_ALONE
 from pipeline.results.finished_run import FinishedRun
 from pipeline.run.progress import Progress
 from pipeline.run.workers import Workers, workers
@@ -89,10 +88,9 @@ def _run(path: Path, session: SessionConfig) -> FinishedRun:
             f"--run {path}: has {plural(len(run.heads), 'head')}, this session {len(session.heads)}; name a run of "
             "this boat with the same heads"
         )
-    grave = [code for code in run.result["reason_codes"] if code not in WEAK_ALONE]
-    if grave:
+    if run.grave_reasons:
         raise ConfigError(
-            f"--run {path}: was rejected for {', '.join(dict.fromkeys(grave))}: its lever arm, which the patch test "
+            f"--run {path}: was rejected for {', '.join(run.grave_reasons)}: its lever arm, which the patch test "
             "takes from it, may be wrong; mend that first"
         )
     return run

@@ -23,7 +23,6 @@ from pipeline.georeference.pool_context import PoolContext, pool_frame_of
 from pipeline.language.speaking import say
 from pipeline.maths.target.model import TargetModel
 from pipeline.readers.dispatch import raw_parts
-from pipeline.report.reason_codes import WEAK_ALONE
 from pipeline.results.finished_run import FinishedRun
 from pipeline.run.output_files import refuse_output
 from pipeline.run.results import Tables
@@ -75,10 +74,9 @@ def _target(run: FinishedRun, folder: Path) -> Faces:
         raise ConfigError(f"{where}: is of the session {run.settings.session_folder}; name a run of {folder}")
     if not isinstance(target, Faces):
         raise ConfigError(f"{where}: its target has letters, which determine all without the bottom; it takes faces")
-    grave = [code for code in run.result["reason_codes"] if code not in WEAK_ALONE]
-    if grave or run.result["methods"]["adjustment"]["mount"] is None:
+    if run.grave_reasons or run.result["methods"]["adjustment"]["mount"] is None:
         raise ConfigError(
-            f"{where}: was rejected for {', '.join(dict.fromkeys(grave))}: its mount may be wrong, and would put the "
+            f"{where}: was rejected for {', '.join(run.grave_reasons)}: its mount may be wrong, and would put the "
             "bottom elsewhere; mend that first"
         )
     return target
