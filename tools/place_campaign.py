@@ -38,8 +38,7 @@ from tools.session_rows import NAMES, error_columns
 FOLDER = Path("runs/places")
 ROUGH_PLACES = ("slip", "lock", "returns", "slope")
 FIRST_SEED = 70_000
-PLANNED = 5  # sessions of a place for which the plan is asked, too
-ONE_SINE = float(np.sqrt(0.75**2 + 0.25**2))  # amplitude of one sine of the same RMS as the simulator's two (Wave)
+PLANNED = 10  # sessions of a place for which the plan is asked, too
 AS_BUILT = AsBuilt(offset_sigma_m=0.02, angle_sigma_deg=0.1, bow_sigma_m=0.005, growth_sigma_m=0.015)
 TARGET = {"kind": "found", "depth_m": 4.0}
 
@@ -135,10 +134,10 @@ def _predicted(
     content = {
         "ins_rate_hz": settings.ins.rate_hz,
         "unrest": {
-            "roll_deg": ONE_SINE * motion.roll.amplitude,
-            "pitch_deg": ONE_SINE * motion.pitch.amplitude,
-            "sway_m": ONE_SINE * motion.sway.amplitude,
-            "heave_m": ONE_SINE * motion.heave.amplitude,
+            "roll_deg": motion.roll.amplitude,
+            "pitch_deg": motion.pitch.amplitude,
+            "sway_m": motion.sway.amplitude,
+            "heave_m": motion.heave.amplitude,
             "period_s": motion.roll.period_s,
         },
         "laser": settings.laser.model_dump(include={"point_rate_hz", "line_rate_hz", "field_deg"}, mode="json"),
@@ -147,8 +146,7 @@ def _predicted(
             {
                 "distance_m": distance,
                 "course": courses[k % len(courses)],
-                "half_length_m": settings.half_length_m,
-                "heading_swing_deg": ONE_SINE * motion.heading.amplitude,
+                "heading_swing_deg": motion.heading.amplitude,
             }
             for k, distance in enumerate(settings.track.distances_m)
         ],

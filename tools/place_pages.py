@@ -19,9 +19,10 @@ head that looks to starboard.
 EXPLAINED = """
 The normalised squared error (NSE) by the total covariance is 6 in the mean if the sigmas are true. A session of which a
 test or a search says that something is wrong is rejected, and its NSE stands in the last column but one, not in the
-first. "Plan" is the total sigma that `poolcal plan` predicts for the same passes and for unrest of the same RMS, the
-median of the first five sessions: each at the faces that it found, with the mount that it gave (walls that look one way
-show yaw by its sine).
+first. "Plan" is the total sigma that `poolcal plan` predicts for the same passes and the same unrest, at the faces that
+the session found, with the mount that it gave (walls that look one way show yaw by its sine); of the ratios of the
+first {planned} sessions this is the median. The plan lets each ping fall anywhere between the INS's records and the
+laser's lines; the simulated clocks keep one phase, which moves y and z by a tenth.
 """
 
 
@@ -33,8 +34,8 @@ def summary(table: pd.DataFrame) -> str:
     )  # fmt: skip
     lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
     lines += [_line(str(place), rows) for place, rows in table.groupby("place", sort=False)]
-    sessions = int(table.groupby("place").size().max())
-    return HEAD.format(sessions=sessions) + "\n".join(lines) + "\n" + EXPLAINED
+    sessions, planned = (int(table.groupby("place")[name].count().max()) for name in ("seed", "planned_roll"))
+    return HEAD.format(sessions=sessions) + "\n".join(lines) + "\n" + EXPLAINED.format(planned=planned)
 
 
 def _line(place: str, rows: pd.DataFrame) -> str:
@@ -42,15 +43,14 @@ def _line(place: str, rows: pd.DataFrame) -> str:
     accepted = rows["verdict"] == "accepted"
     weak = ~accepted & codes.map(lambda words: set(words.split()) <= WEAK_ALONE)
     honest, others = rows[accepted | weak], rows[~(accepted | weak)]
-    of_plan = rows[rows["planned_roll"].notna()]
-    errors, totals, planned = (
+    errors, totals, found, planned = (
         part[[f"{kind}_{name}" for name in NAMES]].to_numpy(float)
-        for kind, part in (("error", rows[accepted]), ("total", honest), ("planned", of_plan))
+        for kind, part in (("error", rows[accepted]), ("total", honest), ("total", rows), ("planned", rows))
     )
     low, high = nse_band(max(len(honest), 1))
     worst = np.abs(errors / rows.loc[accepted, [f"total_{name}" for name in NAMES]].to_numpy(float))
     medians = np.median(totals, axis=0) if len(honest) else np.full(len(NAMES), np.nan)
-    against = medians / np.median(planned, axis=0)
+    against = np.nanmedian(found / planned, axis=0)
     reasons = ", ".join(sorted({word for words in codes[others.index] for word in words.split()} - WEAK_ALONE))
     cells = (
         place, f"{int(accepted.sum())} of {len(rows)}", str(int(weak.sum())),

@@ -9,6 +9,7 @@ from pipeline.config.quantities import Angle, Length, Lever, Model, TransmitSect
 Rate = Annotated[float, Field(ge=0.1, le=1e7)]
 Swing = Annotated[float, Field(ge=0, le=45)]
 Sway = Annotated[float, Field(ge=0, le=5)]
+WAVE_PERIODS, WAVE_SHARES = (1.0, 0.37), (0.75, 0.25)  # the two waves of a motion: of its period, of its amplitude
 
 
 class LaserFigures(Model):
@@ -31,7 +32,10 @@ class MbesFigures(Model):
 
 
 class Unrest(Model):
-    """Amplitudes and period of the boat's motion about its track."""
+    """Amplitudes and period of the boat's motion about its track.
+
+    Of each amplitude 3/4 belong to a wave of the motion's period, 1/4 to one of 0.37 of it.
+    """
 
     roll_deg: Swing = 1.0
     pitch_deg: Swing = 0.6

@@ -20,6 +20,7 @@ from pipeline.target.surface import ClosestSurface
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
+GOLDEN = 0.618034  # its multiples spread evenly over a unit
 RAYS = 24  # of the laser between two INS records; each stands for several
 
 
@@ -45,11 +46,17 @@ def laser_rays(setting: PredictionSetting, seconds: float) -> tuple[Rays, float]
 
 
 def sonar_rays(setting: PredictionSetting, seconds: float) -> tuple[Rays, float]:
-    """Return the sonar's rays during ``seconds``, and the number of soundings that each represents: one."""
+    """Return the sonar's rays during ``seconds``, and the number of soundings that each represents: one.
+
+    The pings fall anywhere between two INS records, and between two lines of the laser, as with clocks of their own.
+    For the white noise of a pose between two records, p·(1 - f) + q·f, has (1 - f)² + f² times the variance of a
+    record's, and it is the laser's, too, where the laser sees the target at the same moment.
+    """
     figures = setting.plan.mbes
     half = np.radians(figures.sector_deg) / 2
     angle = np.linspace(-half, half, figures.beams)
-    pings = np.arange(0.5 / figures.ping_rate_hz, seconds, 1 / figures.ping_rate_hz)
+    numbers = np.arange(int(seconds * figures.ping_rate_hz))
+    pings = (numbers + numbers * GOLDEN % 1.0) / figures.ping_rate_hz
     edges_deg, tilts_deg = np.array([(sector.to_deg, sector.tilt_deg) for sector in figures.sectors] or [(90.0, 0.0)]).T
     tilt = np.radians(tilts_deg[np.searchsorted(edges_deg, np.degrees(angle))])
     speed = np.full(len(angle), SPEED_M_S)

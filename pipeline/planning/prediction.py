@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pipeline.adjustment.ins_drift import pose_noise
 from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
 from pipeline.adjustment.problem import faces_on_surfaces, sensor_sigmas
-from pipeline.config.plan import Pass
+from pipeline.config.plan import WAVE_PERIODS, WAVE_SHARES, Pass
 from pipeline.gps_time import NS
 from pipeline.maths.adjustment.body_motion import BodyMotion
 from pipeline.maths.adjustment.face_shifts import equations_with_faces
@@ -33,6 +33,7 @@ from pipeline.planning.setting import PredictionSetting
 from pipeline.target.surface import ClosestSurface
 
 Array = NDArray[np.float64]
+PHASE_STEPS = np.array([0.618034, 0.414214])  # of the two waves, in turns; irrational, so that all phases come
 PHASES, APART = 4, 1000  # number of phases of the boat's unrest in a prediction; step of the pass number between them
 PAUSE_S = 5.0  # a longer time without points interrupts the knots of the drift
 
@@ -187,14 +188,15 @@ def planned_track(setting: PredictionSetting, planned: Pass, number: int) -> Arr
 
 
 def _trajectory(setting: PredictionSetting, planned: Pass, seconds: float, number: int) -> Trajectory:
-    """Return poses along ±y past the target at x = -distance, with waves of golden-ratio phases on all except y."""
+    """Return poses along ±y past the target at x = -distance, with two waves on all except y."""
     plan, unrest = setting.plan, setting.plan.unrest
     t = np.arange(0.0, seconds + 1 / plan.ins_rate_hz, 1 / plan.ins_rate_hz)
     half = planned.half_length_m or setting.half_length_m
 
     def wave(amplitude: float, period_s: float, which: int) -> Array:
-        phase = 2 * np.pi * ((number * 5 + which) * 0.618034 % 1.0)
-        return np.asarray(amplitude * np.sin(2 * np.pi * t / period_s + phase))
+        phases = 2 * np.pi * np.modf((number * 5 + which) * PHASE_STEPS)[0]
+        angles = 2 * np.pi * np.divide.outer(t, np.multiply(WAVE_PERIODS, period_s)) + phases
+        return np.asarray(amplitude * (np.sin(angles) @ WAVE_SHARES))
 
     period = unrest.period_s
     x = wave(unrest.sway_m, 2 * period, 0) - planned.distance_m

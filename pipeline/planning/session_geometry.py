@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline.config.plan import LaserFigures, MbesFigures, Pass, Plan
+from pipeline.config.plan import WAVE_SHARES, LaserFigures, MbesFigures, Pass, Plan
 from pipeline.maths.adjustment.solution import Solution
 from pipeline.planning.observability import Coverage, geometry_advice
 from pipeline.planning.setting import PredictionSetting
@@ -63,8 +63,11 @@ def geometry_table(
         level={family.name for family in setting.model.families if family.level},
         sloping={family.name for family in setting.model.families if family.sloping},
         speed_m_s=_measured(passes["speed_m_s"].abs().median(), usual.speed_m_s),
-        # the amplitude of a wave is √2 times its standard deviation
-        heading_swing_deg=_measured(passes["heading_swing_deg"].median() * np.sqrt(2), usual.heading_swing_deg),
+        # its standard deviation, over that of two waves of amplitude 1
+        heading_swing_deg=_measured(
+            passes["heading_swing_deg"].median() / float(np.linalg.norm(WAVE_SHARES) * np.sqrt(0.5)),
+            usual.heading_swing_deg,
+        ),
     )
     advice = geometry_advice(setting, coverage, normal, solution)
     rows = [("gap", words) for words in advice.gaps]
