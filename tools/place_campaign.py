@@ -5,14 +5,11 @@ Each session is simulated, with all errors drawn by their sigmas: each wet face 
 in runs/places/ (``tools.campaign_files``).
 
     python -m tools.place_campaign [--only wall return ...] [--sessions 60] [--jobs 2] [--resume] > FILE.md
-    python -m tools.place_campaign --drawn [...]   # also with the true target drawn: how far the values differ
     python -m tools.place_campaign --rough [...]   # walls as they are (tools.rough_walls): what is accepted, left out
 """
 
 import argparse
 import json
-import subprocess
-import sys
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,16 +21,15 @@ import yaml
 
 from pipeline.config.pool import AsBuilt
 from pipeline.config.yaml_models import parse
-from pipeline.maths.comparison import mount_error
 from pipeline.simulation.scenario import Scenario
 from pipeline.target.design import target_of
 from tools.campaign_files import collect_rows
 from tools.campaigns import DRIFT, TASKS_OF_A_WORKER
 from tools.drawn_errors import errors_at
-from tools.place_pages import differences, summary, summary_of_rough
+from tools.place_pages import summary, summary_of_rough
 from tools.places import PLACES, scenario_of_place
 from tools.rough_walls import drawn_into, drawn_names
-from tools.session_rows import NAMES, error_columns
+from tools.session_rows import error_columns, poolcal
 
 FOLDER = Path("runs/places")
 ROUGH_PLACES = ("slip", "lock", "returns", "slope")
@@ -45,7 +41,7 @@ TARGET = {"kind": "found", "depth_m": 4.0}
 
 @dataclass(frozen=True)
 class Task:
-    """A session: its place, and its seed; whether the plan's sigmas, and the values on the drawn target, are wanted.
+    """A session: its place, and its seed; whether the plan's sigmas are wanted.
 
     rough: the walls are as they are.
     """
@@ -53,7 +49,6 @@ class Task:
     place: str
     seed: int
     planned: bool = False
-    drawn: bool = False
     rough: bool = False
 
 
@@ -70,9 +65,9 @@ def row_of(task: Task) -> dict[str, Any]:
         file.write_text(yaml.safe_dump(scenario), encoding="utf-8")
         purpose = "order_1a" if task.rough else "special_order"
         config.write_text(yaml.safe_dump({"target": TARGET, "verdict": {"purpose": purpose}}), encoding="utf-8")
-        _poolcal(["simulate", session, "--scenario", file, "--seed", task.seed], (0,))
+        poolcal(["simulate", session, "--scenario", file, "--seed", task.seed], (0,))
         command = ["run", session, "--config", config, "--run", run, "--jobs", "1", "--no-report", "--no-recordings"]
-        _, said = _poolcal(command, (0, 1, 2))
+        _, said = poolcal(command, (0, 1, 2))
         written = run / "report" / "calibration.json"
         if not written.is_file():
             return row | {"verdict": "no result", "reasons": said.strip().splitlines()[-1]}
@@ -82,8 +77,6 @@ def row_of(task: Task) -> dict[str, Any]:
         if task.planned:
             known = _as_it_is(found, scenario, row["fault"]) if task.rough else found
             row |= _predicted(session, known, scenario, purpose, calibration["mbes"]["mount"])
-        if task.drawn:
-            row |= _by_drawing(session, calibration)
         if task.rough:
             row |= _left_out(calibration, found["target"], scenario["target"])
     row |= {"verdict": calibration["verdict"], "reasons": " | ".join(calibration["reasons"])}
@@ -98,21 +91,6 @@ def _left_out(calibration: dict[str, Any], found: dict[str, Any], drawn: dict[st
         families = [row["family"] for row in rows if (row["low_m"] is None and row["high_m"] is None) == whole]
         columns[name] = " ".join(drawn_names(families, found, drawn))
     return columns
-
-
-def _by_drawing(session: Path, by_finding: dict[str, Any]) -> dict[str, float]:
-    """Return the values on the found target less those on the drawn one, in total sigmas of the former."""
-    content = yaml.safe_load((session / "pool.yaml").read_text("utf-8"))
-    content["as_built"] = AS_BUILT.model_dump(mode="json")
-    config, run = session.parent / "drawn.yaml", session.parent / "by-drawing"
-    config.write_text(yaml.safe_dump(content), encoding="utf-8")
-    options = ["--jobs", "1", "--no-report", "--no-recordings"]
-    _poolcal(["run", session, "--config", config, "--run", run, *options], (0, 1))
-    other = json.loads((run / "report" / "calibration.json").read_text("utf-8"))
-    found, drawn = (one["methods"]["adjustment"] for one in (by_finding, other))
-    mounts = [(np.array(one["R_body_from_mbes"]), np.array(one["lever_arm_m"])) for one in (drawn, found)]
-    apart = mount_error(*mounts[1], *mounts[0]) / np.sqrt(np.diag(found["covariance_total"]))
-    return {f"apart_{name}": float(value) for name, value in zip(NAMES, apart, strict=True)}
 
 
 def _predicted(
@@ -152,7 +130,7 @@ def _predicted(
         ],
     }
     plan.write_text(yaml.safe_dump(content), encoding="utf-8")
-    status, _ = _poolcal(["plan", plan, "--session", place, "--config", pool, "--yaml", out], (0, 1))
+    status, _ = poolcal(["plan", plan, "--session", place, "--config", pool, "--yaml", out], (0, 1))
     sigmas = yaml.safe_load(out.read_text("utf-8"))["given"]["sigma_mount_total"] or {}
     keys = {"pitch": "pitch_deg", "roll": "roll_deg", "yaw": "yaw_deg", "x": "x_m", "y": "y_m", "z": "z_m"}
     return {"allowed": status == 0} | {
@@ -172,20 +150,12 @@ def _as_it_is(found: dict[str, Any], scenario: dict[str, Any], fault: str) -> di
     return found | {"target": found["target"] | {"faces": true}, "as_built": found["as_built"] | stated}
 
 
-def _poolcal(words: list[Any], allowed: tuple[int, ...]) -> tuple[int, str]:
-    done = subprocess.run([sys.executable, "-m", "stages.cli", *map(str, words)], capture_output=True, text=True)
-    if done.returncode not in allowed:
-        raise RuntimeError(done.stderr)
-    return done.returncode, done.stderr
-
-
 def main() -> None:
     """Run the campaign and print its table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", nargs="+", choices=list(PLACES), help="default: all, or those fit for --rough")
     parser.add_argument("--sessions", type=int, default=60, help="of each place; default: 60")
     parser.add_argument("--jobs", type=int, default=2, help="sessions at a time; default: 2")
-    parser.add_argument("--drawn", action="store_true", help="calibrate on the drawn target, too, and compare")
     parser.add_argument("--rough", action="store_true", help="walls as they are, with a false wet face in every second")
     parser.add_argument("--resume", action="store_true", help="keep the rows of an interrupted campaign")
     given = parser.parse_args()
@@ -193,14 +163,12 @@ def main() -> None:
     for place in given.only or (ROUGH_PLACES if given.rough else PLACES):
         first = FIRST_SEED + 1000 * list(PLACES).index(place)
         tasks = [
-            Task(place, first + k, planned=k < PLANNED or given.rough, drawn=given.drawn, rough=given.rough)
+            Task(place, first + k, planned=k < PLANNED or given.rough, rough=given.rough)
             for k in range(given.sessions)
         ]
         path = FOLDER / f"{'rough-' * given.rough}{place}.parquet"
         tables.append(collect_rows(path, row_of, tasks, given.jobs, given.resume, TASKS_OF_A_WORKER))
     print((summary_of_rough if given.rough else summary)(pd.concat(tables)), end="")
-    if given.drawn:
-        print(differences(pd.concat(tables)))
 
 
 if __name__ == "__main__":

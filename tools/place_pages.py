@@ -120,13 +120,3 @@ def _line_of_rough(place: str, rows: pd.DataFrame) -> str:
         f"{found}, {doubts} of {len(false)}", str(more),
     )  # fmt: skip
     return f"| {' | '.join(cells)} |"
-
-
-def differences(table: pd.DataFrame) -> str:
-    """Return a line for each place: how far the values on the found and on the drawn target differ, RMS in sigmas."""
-    lines = ["Values on the found target less those on the drawn one, RMS in total sigmas:", ""]
-    for place, rows in table.groupby("place", sort=False):
-        each = np.sqrt((rows[[f"apart_{name}" for name in NAMES]].to_numpy(float) ** 2).mean(axis=0))
-        named = ", ".join(f"{name} {size:.2f}" for name, size in zip(NAMES, each, strict=True))
-        lines.append(f"* {place} ({len(rows)} sessions): {named}; all {np.sqrt(np.mean(each**2)):.2f}")
-    return "\n".join(lines)

@@ -7,6 +7,10 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
+import numpy as np
+
+from pipeline.maths.geometry.geodesy import PoolFrame
+
 Corners = list[list[float]]
 FOOT_M, TOP_M = -4.0, 2.0
 TRACK: dict[str, Any] = {"distances_m": [4.0, 7.0, 5.0, 6.0], "half_length_m": 6.0}
@@ -93,3 +97,10 @@ def scenario_of_place(name: str, *more: dict[str, Any]) -> dict[str, Any]:
         for key, value in block.items():
             total[key] = total.get(key, {}) | value if isinstance(value, dict) else value
     return total
+
+
+def frame_of(target: dict[str, Any]) -> PoolFrame:
+    """Return the frame of a target's settings."""
+    origin = target["origin"]
+    latitude, longitude = (float(np.radians(origin[name])) for name in ("latitude_deg", "longitude_deg"))
+    return PoolFrame.at(latitude, longitude, origin["height_m"], float(np.radians(target["azimuth_deg"])))

@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.maths.geometry.geodesy import PoolFrame
-from tools.places import FOOT_M, PLACES, TOP_M
+from tools.places import FOOT_M, PLACES, TOP_M, frame_of
 
 Draws = np.random.Generator
 NEAR_M = 0.3  # a found face nearer to a drawn one is that one
@@ -84,7 +83,7 @@ def drawn_into(scenario: dict[str, Any], place: str, seed: int) -> dict[str, Any
 
 def drawn_names(families: Iterable[str], found: dict[str, Any], drawn: dict[str, Any]) -> list[str]:
     """Return the names of the drawn faces that found ones are; of one that is none of them "?" and its own name."""
-    frames = [_frame(target) for target in (found, drawn)]
+    frames = [frame_of(target) for target in (found, drawn)]
     names = []
     for family in families:
         middle = np.mean(found["faces"][family]["corners"], axis=0)
@@ -93,12 +92,6 @@ def drawn_names(families: Iterable[str], found: dict[str, Any], drawn: dict[str,
         near = _off_m(np.array(drawn["faces"][best]["corners"]), place) < NEAR_M
         names.append(best if near else f"?{family}")
     return names
-
-
-def _frame(target: dict[str, Any]) -> PoolFrame:
-    origin = target["origin"]
-    latitude, longitude = (float(np.radians(origin[name])) for name in ("latitude_deg", "longitude_deg"))
-    return PoolFrame.at(latitude, longitude, origin["height_m"], float(np.radians(target["azimuth_deg"])))
 
 
 def _off_m(corners_m: np.ndarray, place_m: np.ndarray) -> float:

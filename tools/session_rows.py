@@ -4,7 +4,7 @@ import json
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -74,23 +74,30 @@ def session_through_files(campaign: Campaign, number: int) -> dict[str, Any]:
     Raises
     ------
     RuntimeError
-        A command ended with neither status 0 nor 1.
+        A command failed.
     """
     with tempfile.TemporaryDirectory() as folder:
         scenario, session, run = Path(folder, "scenario.yaml"), Path(folder, "session"), Path(folder, "run")
         scenario.write_text(yaml.safe_dump(scenario_of(campaign, number)))
-        poolcal = [sys.executable, "-m", "stages.cli"]
-        seed = str(campaign.first_seed + number)
-        place = ["--config", str(session / "pool.yaml"), "--run", str(run)]
-        for command in (
-            ["simulate", str(session), "--scenario", str(scenario), "--seed", seed],
-            ["run", str(session), *place, "--jobs", "1", "--no-report", "--no-recordings"],
-        ):
-            done = subprocess.run(poolcal + command, capture_output=True, text=True)
-            if done.returncode not in (0, 1):
-                raise RuntimeError(done.stderr)
+        place = ["--config", session / "pool.yaml", "--run", run]
+        poolcal(["simulate", session, "--scenario", scenario, "--seed", campaign.first_seed + number], (0,))
+        poolcal(["run", session, *place, "--jobs", "1", "--no-report", "--no-recordings"], (0, 1))
         calibration = json.loads((run / "report" / "calibration.json").read_text())
         return _row(campaign, calibration, json.loads(Path(f"{session}.truth.json").read_text()))
+
+
+def poolcal(words: Iterable[object], allowed: tuple[int, ...]) -> tuple[int, str]:
+    """Run a command of poolcal; return its exit status, which must be an allowed one, and what it says on stderr.
+
+    Raises
+    ------
+    RuntimeError
+        It ended with another status.
+    """
+    done = subprocess.run([sys.executable, "-m", "stages.cli", *map(str, words)], capture_output=True, text=True)
+    if done.returncode not in allowed:
+        raise RuntimeError(done.stderr)
+    return done.returncode, done.stderr
 
 
 def _row(campaign: Campaign, calibration: Mapping[str, Any], truth: Mapping[str, Any]) -> dict[str, Any]:

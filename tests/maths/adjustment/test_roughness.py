@@ -92,3 +92,16 @@ def test_two_passes_of_a_short_wall_are_rough_where_they_are_alike(
         found.append(short.by_size()[:, 0].max() > 0)
     assert np.mean(found) >= least
     assert least or np.mean(found) < 0.4
+
+
+@pytest.mark.parametrize(("sigma_m", "low", "high"), [(0.0, 0.0, 0.003), (SIGMA_M, 0.9, 1.0)])
+def test_four_passes_of_a_short_wall_are_rough_where_it_is(sigma_m: float, low: float, high: float) -> None:
+    """Few blocks: a normal limit for what they have in common finds roughness on three of a hundred smooth walls."""
+    found = []
+    for seed in range(60 if sigma_m else 500):
+        rng = np.random.default_rng(seed)
+        whole = lines(rng, field(rng, 0.2, sigma_m))
+        near = whole.place_m < 1.6
+        short = _PlacedLines(whole.value[near], whole.weight[near], whole.place_m[near], whole.run[near])
+        found.append(short.by_size()[:, 0].max() > 0)
+    assert low <= np.mean(found) <= high
