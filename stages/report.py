@@ -117,7 +117,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         *correlated_beams(inputs.groups),
         *sigmas_too_small(first.estimate, config.adjust.test_level),
         *errors_allowed_for(inputs.freed, config.adjust.test_level),
-        *target_off_origin(target), *target_found(model), *unsurveyed_walls(inputs.left_out, inputs.groups),
+        *target_off_origin(target), *target_found(model), *unsurveyed_walls(first, config.limits),
         *(check for check in (drift_check, off_figures) if check is not None and check not in (NO_DRIFT, *reasons)),
         *report.pass_warnings,
         *deviations_from_design(shape, design_shape(model), shape_errors(inputs.planes, model)),

@@ -224,6 +224,12 @@ REMEDIES: dict[Code, Remedy] = {
         "them.",
         "See what is there, at low water or with a camera. If the sigmas are too large without it, pass more walls.",
     ),
+    Code.UNSEEN_FACE_ERROR: Remedy(
+        "With few walls, one that stands off its plane below the water by more than `as_built` says looks like another "
+        "lever arm. The text says by how much one could stand off unnoticed, and what it would do.",
+        "Look at the walls below the water (a diver, a camera, a plumb line, low tide). Pass more walls, in further "
+        "directions, or the bottom. If you know how far they may be off, say so: `as_built.offset_sigma_m`.",
+    ),
     Code.ROUGH_WALL: Remedy(
         "Mussels, weed, stones, joints: patches of a wall stand off its plane, and every pass sees the same patches. "
         "More soundings on them tell nothing new.",

@@ -6,19 +6,26 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from pipeline.config.verdict import VerdictLimits
 from pipeline.maths.adjustment.parameters import kind_of
 from pipeline.report.calibration_document import json_number
 from pipeline.report.cause_words import size_words
+from pipeline.report.evidence import Evidence
 from pipeline.report.noise_warnings import points_of
 from pipeline.report.reason_codes import ReasonCode, Statement, named
+from pipeline.report.unseen_faces import unseen_face_error
 
 LEAST_PATCH_M = 0.001  # RMS of a wall's patches that is worth a word
 SEEN_BY = {"laser": "above the water", "mbes": "below the water"}
 
 
-def unsurveyed_walls(left_out: pd.DataFrame, groups: pd.DataFrame) -> list[Statement]:
-    """Return the warnings about walls that nobody has surveyed, from the tables ``left_out`` and ``groups``."""
-    return [*faces_left_out(left_out), *rough_walls(groups)]
+def unsurveyed_walls(evidence: Evidence, limits: VerdictLimits) -> list[Statement]:
+    """Return the warnings about walls that nobody has surveyed; ``limits``: those of the verdict."""
+    return [
+        *faces_left_out(evidence.left_out),
+        *rough_walls(evidence.groups),
+        *unseen_face_error(evidence.freed, limits),
+    ]
 
 
 def faces_left_out(left_out: pd.DataFrame) -> list[Statement]:
