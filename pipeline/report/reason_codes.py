@@ -77,7 +77,7 @@ class ReasonCode(StrEnum):
     TARGET_OFF_ORIGIN = "target_off_origin", "the target stands far from target.origin, or out of plumb"
     TARGET_FOUND = "target_found", "the target was found in laser points, and its faces go on below the water unproven"
     FACE_LEFT_OUT = "face_left_out", "soundings on a face are left out: below the water it does not go on as above"
-    UNSEEN_FACE_ERROR = "unseen_face_error", "a wall could stand off below the water unnoticed, and the mount be wrong"
+    UNSEEN_FACE_ERROR = "unseen_face_error", "a wall could be off below the water unnoticed, and the mount be wrong"
     ROUGH_WALL = "rough_wall", "patches of the walls stand off their planes, and the sigmas allow for it"
     PASS_WITHOUT_SOUNDINGS = "pass_without_soundings", "in some passes the laser alone saw the target"
     PASS_WITHOUT_LASER = "pass_without_laser", "in some passes the sonar alone saw the target"

@@ -34,15 +34,29 @@ def test_angles_count_by_their_own_limit() -> None:
     assert "(quay), and roll would be wrong by 0.29°;" in words
 
 
+def test_a_turn_is_told_in_degrees() -> None:
+    turn = shift("wet_quay_2_turn_1", np.radians(0.1), np.radians(0.15), effect_rotation_y=np.radians(0.05))
+    (words,) = said(turn, shift())
+    assert words.startswith("a wall that is turned by 0.6° below the water could go unnoticed (quay_2), and roll would")
+    assert "would be wrong by 0.29°;" in words
+
+
+def test_of_a_face_that_nothing_tests_ten_sigmas_are_told() -> None:
+    (words,) = said(shift(expected=100.0))
+    assert words.startswith("a wall that stands off by 200 mm below the water")
+    assert "wrong by 40 mm;" in words
+
+
 @pytest.mark.parametrize(
     "row",
     [
         shift(considered=0.002, effect_lever_arm_y=1.0),
-        shift("wet_quay_turn_1", effect_lever_arm_y=1.0),
+        shift("wet_quay_bow", effect_lever_arm_y=1.0),
+        shift("wet_quay_turn_1", considered=np.radians(0.02), effect_rotation_x=1.0),
         shift(expected=np.nan, effect_lever_arm_y=1.0),
         shift(effect_lever_arm_y=1.0) | {"known": False},
     ],
-    ids=["surveyed", "turn", "not seen", "fixed"],
+    ids=["surveyed", "bow", "direction surveyed", "not seen", "fixed"],
 )
 def test_other_rows_say_nothing(row: dict) -> None:
     assert said(row) == []
