@@ -225,8 +225,8 @@ REMEDIES: dict[Code, Remedy] = {
         "See what is there, at low water or with a camera. If the sigmas are too large without it, pass more walls.",
     ),
     Code.UNSEEN_FACE_ERROR: Remedy(
-        "With few walls, one that is off below the water by more than `as_built` says looks like another mount. The text "
-        "says by how much one could be off unnoticed, and what it would do.",
+        "With few walls, one that is off below the water by more than `as_built` says looks like another mount. The "
+        "text says by how much one could be off unnoticed, and what it would do.",
         "Look at the walls below the water (a diver, a camera, a plumb line, low tide). Pass more walls, in further "
         "directions, or the bottom. If you know how far they may be off, say so: `as_built.offset_sigma_m`.",
     ),
