@@ -45,12 +45,12 @@ over less than the wall's height both add the same: the weight of soundings per 
 larger of the two holds for means and slopes.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import fdtrc, ndtr
 
 from pipeline.maths.adjustment.body_motion import BodyMotion
 from pipeline.maths.adjustment.interval_sums import N_MOVED, Intervals, blocks
@@ -65,7 +65,7 @@ SIZES_M = (0.25, 0.5, 1.0, 2.0)  # lengths of blocks
 FEWEST_PAIRS = CERTAIN**2  # of block means, for a test
 MOSTLY_ALIKE = 0.8  # part of E M² that must be alike in both passes where a test is not possible
 FEWEST_BLOCKS, DETREND = 4, 2  # blocks in a pass; parameters of the line that it is freed of
-LARGEST_CHANCE = float(ndtr(-CERTAIN)) / (2 * len(SIZES_M))  # of each size, and of means and slopes
+LARGEST_CHANCE = math.erfc(CERTAIN / math.sqrt(2)) / 2 / (2 * len(SIZES_M))  # of each size, and of means and slopes
 LEAST_SHARE = 0.1  # of the usual weight of a block: one with less is not used
 
 
@@ -210,6 +210,8 @@ def _of_block_means(mean: Array, weight: Array, used: NDArray[np.bool_]) -> tupl
 
 def _chance(mean: Array, used: NDArray[np.bool_]) -> float:
     """Return the chance that the block means of passes are as much alike without roughness, by the F test."""
+    from scipy.special import fdtrc
+
     count = used.sum(axis=0)
     blocks_seen, passes = np.sum(count > 0), np.sum(np.any(used, axis=1))
     alike = np.sum(mean.sum(axis=0) ** 2 / np.maximum(count, 1))
