@@ -107,13 +107,13 @@ def test_both_sensors_see_the_same_uneven_faces(
         assert np.std(on_wall[:, 0]) > 0.001
     many = np.random.default_rng(0).uniform(-20, 20, (5000, 3)) * [0, 1, 1]
     own, beside = [], []
-    for seed in range(12):  # one field has but 32 waves
+    for seed in range(6):
         field = Relief(scenario.target, scenario.surroundings, mesh, seed)
         on_wall = np.full(len(many), wall)
         own.append(field.heights_m(on_wall, many))
         beside.append(field.heights_m(on_wall, many + np.array([0.0, 0.4, 0.0])))
     assert np.std(own) == pytest.approx(0.004, rel=0.02)
-    assert np.corrcoef(np.ravel(own), np.ravel(beside))[0, 1] == pytest.approx(np.exp(-0.5), abs=0.06)
+    assert np.corrcoef(np.ravel(own), np.ravel(beside))[0, 1] == pytest.approx(np.exp(-0.5), abs=0.02)
 
 
 def test_a_fault_of_an_unknown_face_is_refused(changed: Change, noise_free: Scenario) -> None:
