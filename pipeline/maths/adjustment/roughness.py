@@ -18,21 +18,19 @@ all passes, and errors of the pass (noise, drift), which are not. So for two pas
 The mean over blocks and pairs of passes is the estimate of V. Each pass is first freed of a line in y, which drift may
 give it and surfaces' parameters take up; of n blocks this takes 2 degrees of freedom, so V counts n / (n - 2) times.
 
-Whether V is certain says the analysis of variance of one factor, the block (Fisher 1925, "Statistical methods for
-research workers", 40): with P passes, S₁ = Σ_B (Σ_p M_Bp)² / P and S₂ = Σ M_Bp² - S₁,
+Whether V is certain says a test (:mod:`~pipeline.maths.adjustment.rough_blocks`). Only where no wall of the place has
+enough blocks for it, what makes roughness likely on a wall holds for this wall.
 
-    F = (S₁ / (n - 2)) / (S₂ / ((P - 1)(n - 2)))
-
-has Fisher's distribution without roughness, if blocks of a pass are independent. All tests of a surface together have
-the chance of an error that 3 sigmas have. (A normal limit for V, whose distribution is skew, found roughness on 6 of 16
-places with smooth walls.) Where drift makes the blocks of a pass alike, the scatter of the estimates by pairs of passes
-shows it: V must exceed 3 of its sigmas, too. Few pairs cannot be tested, because V is never above E M²: there roughness
-is what makes four fifths of it. In a single pass it cannot be told from the pass's errors: all of E M² beyond noise
-counts as roughness.
+Where the test finds V certain on one wall of a place, all its walls are likely rough, for they stand in the same
+water. There V of the means of the shortest blocks, of which there are most, holds on each wall, certain or not, but for
+a negative one.
 
 A short wall has few long blocks. So its short blocks say how rough it is, and all walls of the place together say by
-how much s V(s) grows from there, the most of all sizes. Where the long blocks of one wall say more, they hold. A wall
-too short for any block is as rough as the roughest of the others, by its own weight per length.
+how much s V(s) grows from there, the most of all sizes. Where the long blocks of one wall say more, they hold.
+
+G of a wall with n blocks has the relative variance 2 / (n - 2), large for a short wall. Say the walls of a place differ
+in G by half of it, τ = 1/2. Then the best mean of a wall's own G and that of the place, by all walls together, gives
+the place the weight of 2 / τ² = 8 blocks. A wall too short for blocks is as rough as the place.
 
 Before anything is sailed, G follows from a field of the RMS r, the same in all directions, with the correlation
 exp(-d² / 2 l²) at a distance d. The mean over a line of height H has the covariance ∫ C dz / H with another if H is
@@ -45,7 +43,6 @@ over less than the wall's height both add the same: the weight of soundings per 
 larger of the two holds for means and slopes.
 """
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -55,18 +52,14 @@ from numpy.typing import NDArray
 from pipeline.maths.adjustment.body_motion import BodyMotion
 from pipeline.maths.adjustment.interval_sums import N_MOVED, Intervals, blocks
 from pipeline.maths.adjustment.observed_surface import ObservedSurface
-from pipeline.maths.adjustment.ping_differences import CERTAIN, Lines
+from pipeline.maths.adjustment.ping_differences import Lines
 from pipeline.maths.adjustment.ping_noise import DesignEffects
 from pipeline.maths.adjustment.pose_errors import N_POSE, DriftEstimate
+from pipeline.maths.adjustment.rough_blocks import SIZES_M, OfBlocks, PlacedLines
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-SIZES_M = (0.25, 0.5, 1.0, 2.0)  # lengths of blocks
-FEWEST_PAIRS = CERTAIN**2  # of block means, for a test
-MOSTLY_ALIKE = 0.8  # part of E M² that must be alike in both passes where a test is not possible
-FEWEST_BLOCKS, DETREND = 4, 2  # blocks in a pass; parameters of the line that it is freed of
-LARGEST_CHANCE = math.erfc(CERTAIN / math.sqrt(2)) / 2 / (2 * len(SIZES_M))  # of each size, and of means and slopes
-LEAST_SHARE = 0.1  # of the usual weight of a block: one with less is not used
+OF_PLACE = 8  # degrees of freedom that the place's roughness counts as
 
 
 @dataclass(frozen=True)
@@ -122,8 +115,8 @@ def roughness(
     gap_s : float
         A longer time (s) without observations separates passes.
     """
-    added, patch_m = np.zeros((2, len(surfaces), len(SIZES_M))), np.zeros(len(surfaces))
-    per_length, too_short = np.zeros(len(surfaces)), np.zeros(len(surfaces), dtype=bool)
+    added, certain, tested = np.zeros((3, 2, len(surfaces), len(SIZES_M)))
+    per_length, dof, patch_m = np.zeros((3, len(surfaces)))
     lines = Lines.of(sums, surfaces, np.zeros(N_POSE))
     place, run = _places(sums, surfaces, body, drift), _runs(lines.record, body.seconds, gap_s)
     for number in range(len(surfaces)):
@@ -132,102 +125,41 @@ def roughness(
             continue
         along, sloping = _along(place[rows]), lines.sloping[rows]
         per_length[number] = lines.total[rows].sum() / max(float(np.ptp(along)), SIZES_M[0])
-        of_blocks = _PlacedLines(lines.mean[rows], lines.total[rows], along, run[rows]).by_size()
-        too_short[number] = np.ptp(along) < FEWEST_BLOCKS * SIZES_M[0]
-        added[0, number], patch_m[number] = of_blocks[:, 0], of_blocks[:, 1].max()
-        rows, along = rows[sloping], along[sloping]
+        means = PlacedLines(lines.mean[rows], lines.total[rows], along, run[rows]).by_size()
+        dof[number], patch_m[number] = means[0].dof, max(one.patch_m for one in means)
+        rows, along, slopes = rows[sloping], along[sloping], [OfBlocks()] * len(SIZES_M)
         if len(rows):
             sense = np.where(lines.along[rows] @ lines.along[rows[0]] < 0, -1.0, 1.0)
-            slopes = _PlacedLines(sense * lines.slope[rows], lines.spread[rows], along, run[rows])
-            added[1, number] = slopes.by_size()[:, 0]
+            slopes = PlacedLines(sense * lines.slope[rows], lines.spread[rows], along, run[rows]).by_size()
+        for values, name in ((added, "added"), (certain, "certain"), (tested, "tested")):
+            values[:, number] = [[getattr(one, name) for one in by_size] for by_size in (means, slopes)]
+    if np.any(tested):
+        of_place = certain * tested
+        of_place[0, :, 0] = 1.0
+        effects = all_walls(added * of_place, per_length, dof) * np.any(certain * tested)
+    else:
+        effects = np.max(added * certain, axis=(0, 2))
+    return Roughness(effects, np.where(effects > 0, patch_m, 0.0))
+
+
+def all_walls(added: Array, per_length: Array, dof: Array) -> Array:
+    """Return the effects ω G (s,) of walls, as all walls of the place together show them.
+
+    Parameters
+    ----------
+    added : (2, s, k) array
+        ω G by the means and by the slopes of lines, by wall and size of the blocks, the shortest first.
+    per_length : (s,) array
+        ω, zero for a wall without lines.
+    dof : (s,) array
+        Degrees of freedom of the shortest blocks; zero where there are too few.
+    """
     both = added[:, :, :1] * (added > 0)
     total = both.sum(axis=(0, 1))
     growth = max(1.0, float(np.max(added.sum(axis=(0, 1), where=both > 0) / np.where(total > 0, total, np.inf))))
-    of_surface = np.maximum(growth * added[:, :, 0], added.max(axis=2)).max(axis=0)
-    G = np.max(of_surface[per_length > 0] / per_length[per_length > 0], initial=0.0)
-    return Roughness(np.where(too_short, np.maximum(of_surface, G * per_length), of_surface), patch_m)
-
-
-@dataclass(frozen=True)
-class _PlacedLines:
-    """Values of lines (n,) on one surface, their weights, places along the wall (m), and numbers of their passes."""
-
-    value: Array
-    weight: Array
-    place_m: Array
-    run: Integers
-
-    def by_size(self) -> Array:
-        """Return by size of the blocks what roughness adds to the design effect, and the RMS of the blocks, (k, 2)."""
-        return np.array([self._of_blocks(size) for size in SIZES_M])
-
-    def _of_blocks(self, size_m: float) -> tuple[float, float]:
-        number = np.floor((self.place_m - self.place_m.min()) / size_m).astype(np.int64)
-        runs, run = np.unique(self.run, return_inverse=True)
-        shape = len(runs), int(number.max()) + 1
-        cell, cells = run * shape[1] + number, shape[0] * shape[1]
-        weight = np.bincount(cell, self.weight, cells).reshape(shape)
-        total = np.bincount(cell, self.weight * self.value, cells).reshape(shape)
-        mean, used = np.zeros(shape), np.zeros(shape, dtype=bool)
-        for k in range(len(runs)):
-            use = weight[k] > LEAST_SHARE * np.median(weight[k][weight[k] > 0])
-            if use.sum() >= FEWEST_BLOCKS:
-                of_block = total[k][use] / weight[k][use]
-                mean[k, use], used[k] = _without_line(np.flatnonzero(use).astype(float), of_block, weight[k][use]), use
-        return _of_block_means(mean, np.where(used, weight, 0.0), used)
-
-
-def _without_line(place: Array, value: Array, weight: Array) -> Array:
-    """Return the values (n,) less their weighted line over the places."""
-    design, root = np.stack([np.ones(len(place)), place - place.mean()], axis=1), np.sqrt(weight)
-    line, *_ = np.linalg.lstsq(design * root[:, None], value * root, rcond=None)
-    return np.asarray(value - design @ line)
-
-
-def _of_block_means(mean: Array, weight: Array, used: NDArray[np.bool_]) -> tuple[float, float]:
-    """Return ω G and √V from block means (passes, blocks), zero where not used; zeros if V is not certain."""
-    count = used.sum(axis=0)
-    n = int(np.sum(count > 0))
-    if n < FEWEST_BLOCKS:
-        return 0.0, 0.0
-    squares, of_block = np.sum(mean**2, axis=0), weight.sum(axis=0)
-    mean_square, pairs = squares.sum() / count.sum(), np.sum(count * (count - 1)) / 2
-    if pairs > 0:
-        V = np.sum(mean.sum(axis=0) ** 2 - squares) / 2 / pairs
-        if pairs <= FEWEST_PAIRS:  # of so few no V is certain, for it is never above E M²
-            certain = MOSTLY_ALIKE * mean_square < V
-        else:
-            certain = CERTAIN * _sigma_by_pairs(mean, used) < V and _chance(mean, used) < LARGEST_CHANCE
-    else:
-        noise = np.mean(1 / of_block[count > 0])
-        V = mean_square - noise
-        certain = CERTAIN * noise * np.sqrt(2 / n) < V
-    if not certain:
-        return 0.0, 0.0
-    V *= n / (n - DETREND)
-    return float(V * np.sum(of_block**2) / np.sum(of_block)), float(np.sqrt(V))
-
-
-def _chance(mean: Array, used: NDArray[np.bool_]) -> float:
-    """Return the chance that the block means of passes are as much alike without roughness, by the F test."""
-    from scipy.special import fdtrc
-
-    count = used.sum(axis=0)
-    blocks_seen, passes = np.sum(count > 0), np.sum(np.any(used, axis=1))
-    alike = np.sum(mean.sum(axis=0) ** 2 / np.maximum(count, 1))
-    own = np.sum(mean**2) - alike
-    dof_alike = blocks_seen - DETREND
-    dof_own = count.sum() - DETREND * passes - dof_alike
-    return float(fdtrc(dof_alike, dof_own, alike / dof_alike / (own / dof_own)))
-
-
-def _sigma_by_pairs(mean: Array, used: NDArray[np.bool_]) -> float:
-    """Return the standard deviation of V from its scatter over pairs of passes; zero for a single pair."""
-    first, second = np.triu_indices(len(mean), 1)
-    common = np.sum(used[first] & used[second], axis=1)
-    first, second, common = (each[common > 0] for each in (first, second, common))
-    of_pair = np.sum(mean[first] * mean[second], axis=1) / common
-    return float(np.std(of_pair, ddof=1) / np.sqrt(len(of_pair))) if len(of_pair) > 1 else 0.0
+    G = np.maximum(growth * added[:, :, 0], added.max(axis=2)).max(axis=0) / np.where(per_length > 0, per_length, 1.0)
+    of_place = float(np.sum(dof * G) / max(np.sum(dof), 1.0))
+    return np.asarray(per_length * (dof * G + OF_PLACE * of_place) / (dof + OF_PLACE))
 
 
 def _runs(record: Integers, seconds: Array, gap_s: float) -> Integers:

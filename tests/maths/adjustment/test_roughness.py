@@ -5,7 +5,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from pipeline.maths.adjustment.roughness import SIZES_M, _PlacedLines
+from pipeline.maths.adjustment.rough_blocks import SIZES_M, PlacedLines
+from pipeline.maths.adjustment.roughness import OF_PLACE, all_walls
 
 Array = np.ndarray
 LENGTH_M, PINGS, PASSES = 12.0, 300, 4
@@ -19,14 +20,19 @@ def field(rng: np.random.Generator, length_m: float, sigma_m: float = SIGMA_M) -
     return lambda place: sigma_m * np.sqrt(2 / 64) * np.cos(np.outer(place, waves) + phases).sum(axis=1)
 
 
-def lines(rng: np.random.Generator, wall: Field, passes: int = PASSES, drift_m: float = 0.0) -> _PlacedLines:
+def lines(rng: np.random.Generator, wall: Field, passes: int = PASSES, drift_m: float = 0.0) -> PlacedLines:
     """Lines of passes along the wall, each with its own noise and its own slow drift."""
     place = np.tile(np.linspace(0.0, LENGTH_M, PINGS), passes)
     run = np.repeat(np.arange(passes), PINGS)
     drifts = [field(rng, 2.0, drift_m) for _ in range(passes)]
     value = wall(place) + NOISE_M * rng.normal(size=len(place))
     value += np.concatenate([drift(place[run == k]) for k, drift in enumerate(drifts)])
-    return _PlacedLines(value, np.full(len(place), NOISE_M**-2.0), place, run)
+    return PlacedLines(value, np.full(len(place), NOISE_M**-2.0), place, run)
+
+
+def certain_effects(found: PlacedLines) -> Array:
+    """By size of the blocks what roughness adds to the design effect, zero where it is not certain."""
+    return np.array([one.added * one.certain for one in found.by_size()])
 
 
 @pytest.mark.parametrize("length_m", [0.1, 0.3])
@@ -37,7 +43,7 @@ def test_the_design_effect_is_that_of_the_mean_of_the_wall(length_m: float) -> N
         rng = np.random.default_rng(seed)
         found = lines(rng, field(rng, length_m))
         means.append(np.mean(found.value) / (NOISE_M / np.sqrt(len(found.value))))
-        effects.append(1 + found.by_size()[:, 0].max())
+        effects.append(1 + certain_effects(found).max())
     assert np.mean(effects) == pytest.approx(np.mean(np.square(means)), rel=0.35)
     expected = np.sqrt(2 * np.pi) * length_m * SIGMA_M**2 / LENGTH_M / (NOISE_M**2 / (PINGS * PASSES))  # ω G
     assert np.mean(effects) == pytest.approx(expected, rel=0.35)
@@ -51,30 +57,41 @@ def test_the_effect_grows_with_the_size_of_blocks_until_they_are_longer_than_the
 
 def _by_size(seed: int, length_m: float) -> Array:
     rng = np.random.default_rng(seed)
-    return lines(rng, field(rng, length_m)).by_size()[:, 0]
+    return certain_effects(lines(rng, field(rng, length_m)))
 
 
 def test_what_differs_from_pass_to_pass_is_no_roughness() -> None:
     """Drift of 2 mm, which noise of a tenth of a millimetre in a block's mean shows clearly."""
-    found = [lines(np.random.default_rng(seed), np.zeros_like, drift_m=0.002).by_size().max() for seed in range(40)]
+    drawn = [lines(np.random.default_rng(seed), np.zeros_like, drift_m=0.002) for seed in range(40)]
+    found = [certain_effects(one).max() for one in drawn]
     assert np.mean(np.array(found) == 0.0) > 0.9
 
 
 def test_a_single_pass_has_roughness_where_it_scatters_more_than_its_noise() -> None:
     smooth, rough = (
-        lines(np.random.default_rng(1), wall, passes=1).by_size()[:, 0].max()
+        certain_effects(lines(np.random.default_rng(1), wall, passes=1)).max()
         for wall in (np.zeros_like, field(np.random.default_rng(2), 0.2))
     )
     assert smooth == 0.0
     assert rough > 100.0
 
 
+def test_blocks_that_one_of_two_passes_has_seen_say_nothing() -> None:
+    """The second pass sees 0.9 m: the blocks that only the first one has seen may scatter by its own errors."""
+    rng = np.random.default_rng(3)
+    found = lines(rng, np.zeros_like, passes=2, drift_m=0.01)
+    seen = (found.run == 0) | (found.place_m < 0.9)
+    part = PlacedLines(found.value[seen], found.weight[seen], found.place_m[seen], found.run[seen])
+    assert certain_effects(part).max() == 0.0
+    assert not any(one.tested for one in part.by_size())
+
+
 def test_few_blocks_say_nothing() -> None:
     rng = np.random.default_rng(1)
     found = lines(rng, field(rng, 0.3))
     near = found.place_m < 0.6
-    short = _PlacedLines(found.value[near], found.weight[near], found.place_m[near], found.run[near])
-    assert short.by_size()[:, 0].max() == 0.0
+    short = PlacedLines(found.value[near], found.weight[near], found.place_m[near], found.run[near])
+    assert certain_effects(short).max() == 0.0
 
 
 @pytest.mark.parametrize(("drift_m", "length_m", "least"), [(0.0, 0.2, 0.9), (0.003, 0.0, 0.0)])
@@ -88,8 +105,8 @@ def test_two_passes_of_a_short_wall_are_rough_where_they_are_alike(
         wall = field(rng, length_m, 0.01) if length_m else np.zeros_like
         whole = lines(rng, wall, passes=2, drift_m=drift_m)
         near = whole.place_m < 1.2
-        short = _PlacedLines(whole.value[near], whole.weight[near], whole.place_m[near], whole.run[near])
-        found.append(short.by_size()[:, 0].max() > 0)
+        short = PlacedLines(whole.value[near], whole.weight[near], whole.place_m[near], whole.run[near])
+        found.append(certain_effects(short).max() > 0)
     assert np.mean(found) >= least
     assert least or np.mean(found) < 0.4
 
@@ -102,6 +119,36 @@ def test_four_passes_of_a_short_wall_are_rough_where_it_is(sigma_m: float, low: 
         rng = np.random.default_rng(seed)
         whole = lines(rng, field(rng, 0.2, sigma_m))
         near = whole.place_m < 1.6
-        short = _PlacedLines(whole.value[near], whole.weight[near], whole.place_m[near], whole.run[near])
-        found.append(short.by_size()[:, 0].max() > 0)
+        short = PlacedLines(whole.value[near], whole.weight[near], whole.place_m[near], whole.run[near])
+        found.append(certain_effects(short).max() > 0)
     assert low <= np.mean(found) <= high
+
+
+def test_a_short_wall_is_as_rough_as_the_place_and_a_long_one_as_it_is_itself() -> None:
+    """G is 3, 1 and 0 of walls with 100, 20 and 0 degrees of freedom, by blocks of all sizes alike; two are alike."""
+    per_length, dof = np.array([2.0, 5.0, 4.0, 0.0]), np.array([100, 20, 0, 0])
+    G = np.array([3.0, 1.0, 0.0, 0.0])
+    found = all_walls(np.tile((per_length * G)[:, None], (2, 1, len(SIZES_M))), per_length, dof)
+    of_place = (100 * 3.0 + 20 * 1.0) / 120
+    assert found[2] == pytest.approx(4.0 * of_place)
+    assert found[1] == pytest.approx(5.0 * (20 * 1.0 + OF_PLACE * of_place) / (20 + OF_PLACE))
+    assert 0.95 < found[0] / 6.0 < 1.0
+    assert found[3] == 0.0
+
+
+def test_the_growth_with_the_size_is_that_of_all_walls_together() -> None:
+    """One wall shows by its long blocks that G is three times that of the short ones; the other has none so long."""
+    added = np.zeros((2, 2, len(SIZES_M)))
+    added[0, 0], added[0, 1] = [1.0, 2.0, 3.0, 3.0], [1.0, 0.0, 0.0, 0.0]
+    np.testing.assert_allclose(all_walls(added, np.ones(2), np.array([40.0, 40.0])), [3.0, 3.0])
+
+
+def test_the_sharing_of_a_place_is_the_best_of_means() -> None:
+    """Walls whose G varies by half of it, each known by few blocks: the squares of what is wrong are the smallest."""
+    rng, dof = np.random.default_rng(4), 8
+    own = np.maximum(rng.normal(1.0, 0.5, 4000), 0.0)
+    seen = own * rng.chisquare(dof, len(own)) / dof
+    added = np.tile(seen[:, None], (2, 1, len(SIZES_M)))
+    shared = all_walls(added, np.ones(len(own)), np.full(len(own), float(dof)))
+    wrong = [np.mean((values - own) ** 2) for values in (shared, seen, np.full(len(own), seen.mean()))]
+    assert wrong[0] < 0.8 * min(wrong[1:])
