@@ -17,6 +17,7 @@ from pipeline.maths.surfaces.voxels import voxels_with_rows
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 VOXEL_M, CELL_M = 0.3, 0.25
+CUT, NORMAL, SMOOTH_M = 3.0, 1.4826, 0.001  # of robust sigmas of the cells; MAD of normal errors; least sigma
 FEWEST, FEWEST_CELLS, REFITS = 4, 8, 5  # points of a cell, cells of a plane, fits of a plane to its cells
 GROWTH = GrowthLimits(thickness_m=0.03, distance_m=0.06, least_voxels=12)
 OFF_M = 0.15  # points of a plane's voxels farther off belong to something in front of it
@@ -24,6 +25,7 @@ SAMPLE = 4000  # points of a plane that are kept for pictures, up to twice as ma
 MARGIN_M, CORNERS = 0.1, 8  # of the outline: inside the outermost cells' means; most corners
 EDGE_CELL_M, EDGE_MARGIN_M = 0.1, 0.05  # the same of the last outline, where the points are dense enough
 BEYOND_M = VOXEL_M + MARGIN_M  # so far outside the first outline the last one may lie
+WAVES_M, OF_HEIGHT = 0.3, 0.25  # above the lowest points: waves, splash, the water's echoes; at most this share
 LEAST_M, UNEVEN_M, BOW_M, COVERED = 1.0, 0.03, 0.03, 0.6  # extent; RMS; height of a bow; share of the cells seen
 LEVEL_DEG = 10.0  # a plane that is less inclined is a deck, a quay's top or the water
 NEAR_WATER_M = 0.5  # largest height of a plane's lower end above the water
@@ -100,12 +102,19 @@ def _plane(all_m: Array, rows: Integers, grown: Plane, boat_m: Array) -> DryPlan
     """Return the plane of a region, toward the boat; rows: of its points among all.
 
     A grown region goes round its corners: by 6 cm into the next wall, which turns the plane of 3 m by 0.4°. So the
-    plane is fitted again, to the means of the cells that lie on it, until it stays.
+    plane is fitted again, to the means of the cells that lie on it, until it stays. Points just above the water are not
+    used, for some of them are echoes of waves and splash, beside the wall and before it; nor are cells that stand off
+    more than the wall is uneven, for they see a part of a fender or of a ladder.
     """
     points_m, normal, distance_m = all_m[rows], grown.normal, grown.distance_m
+    lowest_m, highest_m = np.quantile(points_m[:, 2], [0.01, 0.99])
+    waves_m = float(lowest_m + min(WAVES_M, OF_HEIGHT * (highest_m - lowest_m)))
+    dry_m = points_m[points_m[:, 2] > waves_m]
     for _ in range(REFITS):
-        cells_m, outline = _cells_on(points_m, normal, distance_m, CELL_M, MARGIN_M)
+        cells_m, outline = _cells_on(dry_m, normal, distance_m, CELL_M, MARGIN_M)
         used = cells_m[inside(outline, cells_m @ plane_axes(normal).T)]
+        away = np.abs(used @ normal - distance_m)
+        used = used[away <= CUT * max(NORMAL * float(np.median(away)) if len(away) else 0.0, SMOOTH_M)]
         if len(outline) < 3 or len(used) < FEWEST_CELLS:
             break
         mean = used.mean(axis=0)
@@ -113,13 +122,14 @@ def _plane(all_m: Array, rows: Integers, grown: Plane, boat_m: Array) -> DryPlan
         distance_m = float(normal @ mean)
     sense = 1.0 if normal @ boat_m > distance_m else -1.0
     normal, distance_m = sense * normal, sense * distance_m
-    cells_m, outline = _cells_on(points_m, normal, distance_m, CELL_M, MARGIN_M)
-    outline = _near_the_edge(all_m, normal, distance_m, outline)
+    _, outline = _cells_on(dry_m, normal, distance_m, CELL_M, MARGIN_M)
+    outline = _near_the_edge(all_m, normal, distance_m, outline, waves_m)
     away = points_m @ normal - distance_m
     on = np.abs(away) <= OFF_M
     in_plane, heights, away = points_m[on] @ plane_axes(normal).T, points_m[on, 2], away[on]
     within = inside(outline, in_plane)
     flat = flatness(in_plane[within], away[within], CELL_M)
+    cells_m, _ = _cells_on(points_m, normal, distance_m, CELL_M, MARGIN_M)
     if len(cells_m):  # the extent is that of all cells, the rest is judged within the outline
         width, height = (np.ptp(cells_m @ plane_axes(normal).T, axis=0) + CELL_M).tolist()
         flat = replace(flat, width_m=width, height_m=height)
@@ -137,15 +147,15 @@ def _plane(all_m: Array, rows: Integers, grown: Plane, boat_m: Array) -> DryPlan
     return replace(made, refused=_refusal(made))
 
 
-def _near_the_edge(points_m: Array, normal: Array, distance_m: float, coarse: Array) -> Array:
-    """Return the outline (k, 2) of small cells, which loses less of the plane than the coarse one, if all have points.
+def _near_the_edge(points_m: Array, normal: Array, distance_m: float, coarse: Array, above_m: float) -> Array:
+    """Return the outline (k, 2) of small cells above a height, larger than the coarse one, if all have points.
 
     Means of the outermost coarse cells lie up to half a cell inside the edge, and voxels at a corner belong to neither
     wall: together a fifth of a narrow wall's points.
     """
     if len(coarse) < 3:
         return coarse
-    near = points_m[np.abs(points_m @ normal - distance_m) <= OFF_M]
+    near = points_m[(np.abs(points_m @ normal - distance_m) <= OFF_M) & (points_m[:, 2] > above_m)]
     in_plane, low, high = near @ plane_axes(normal).T, coarse.min(axis=0), coarse.max(axis=0)
     near = near[np.all((in_plane > low - BEYOND_M) & (in_plane < high + BEYOND_M), axis=1)]
     cells_m, fine = _cells_on(near, normal, distance_m, EDGE_CELL_M, EDGE_MARGIN_M)

@@ -13,6 +13,7 @@ from pipeline.finding.dry_planes import (
     FULL,
     NEAR_WATER_M,
     UNEVEN_M,
+    WAVES_M,
     DryPlane,
     dry_planes,
     reaching_water,
@@ -39,7 +40,7 @@ def largest(points: Array) -> DryPlane:
 
 def test_a_column_ends_where_its_lowest_fiftieth_does() -> None:
     """Of columns a cell wide, those with 20 points or more; the last ones of a wall have fewer, or more."""
-    points = wall(4.1, 2.0)[:600]
+    points = wall(4.1, 2.0)[:420]
     plane = largest(points)
     along = np.floor(points @ plane_axes(plane.normal)[0] / CELL_M)
     columns = [np.sort(points[along == k, 2]) for k in np.unique(along)]
@@ -48,13 +49,29 @@ def test_a_column_ends_where_its_lowest_fiftieth_does() -> None:
     np.testing.assert_array_equal(plane.column_ends_m, expected)
 
 
+def test_echoes_of_the_water_move_no_plane_and_no_outline() -> None:
+    """Splash: of the points up to 0.25 m above the water one in four lies up to 10 cm before the wall. The water's own
+    echoes: 1500 points on its surface, up to 0.4 m beyond the wall's ends, some of which lie in the wall's plane."""
+    rng, points = np.random.default_rng(5), wall(8.0, 2.0)
+    splashed = np.flatnonzero((points[:, 2] < WATER_M + 0.25) & (rng.uniform(size=len(points)) < 0.25))
+    points[splashed, 0] -= rng.uniform(0, 0.1, len(splashed))
+    before, along = rng.uniform(-0.2, 0.1, 1500), rng.uniform(-4.4, 4.4, 1500)
+    sea = np.column_stack([FAR[0] + before, FAR[1] + along, WATER_M + rng.normal(0, 0.02, 1500)])
+    plane, plain = largest(np.concatenate([points, sea])), largest(wall(8.0, 2.0))
+    assert plane.refused == ""
+    assert plane.tilt_deg == pytest.approx(90.0, abs=0.05)
+    width, of_plain = (np.ptp(one.corners_m(one.outline_m)[:, 1]) for one in (plane, plain))
+    assert width == pytest.approx(of_plain, abs=0.02)
+    assert water_level_m([plane]) == pytest.approx(WATER_M, abs=0.05)
+
+
 def test_a_plain_wall_serves_and_looks_to_the_boat() -> None:
     plane = largest(wall(8.0, 3.0))
     assert plane.refused == ""
     np.testing.assert_allclose(plane.normal, [-1, 0, 0], atol=2e-4)
     assert plane.tilt_deg == pytest.approx(90.0, abs=0.05)
     corners = plane.corners_m(plane.outline_m)
-    np.testing.assert_allclose(corners.max(axis=0) - corners.min(axis=0), [0, 7.84, 2.84], atol=0.05)
+    np.testing.assert_allclose(corners.max(axis=0) - corners.min(axis=0), [0, 7.84, 2.84 - WAVES_M], atol=0.05)
     np.testing.assert_allclose(corners[:, 0], FAR[0], atol=0.01)
     from_the_other_side = dry_planes(wall(8.0, 3.0), BOAT + np.array([20.0, 0, 0]))[0]
     np.testing.assert_allclose(from_the_other_side.normal, -plane.normal, atol=1e-9)

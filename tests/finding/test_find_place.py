@@ -128,7 +128,7 @@ def test_what_stands_before_a_wall_is_kept_where_the_boat_sees_it() -> None:
     along, height, off = wall.plane.sample_m.T
     before = (off > 0.03) & (height - place.level_m > 0.6) & (height - place.level_m < 1.2)
     assert before.sum() > 10
-    assert np.median(along[before]) - along.min() == pytest.approx(1.15, abs=0.12)
+    assert 1.0 < np.median(along[before]) - along.min() < 1.2  # 1.15 from the end; the kept points begin inside it
     np.testing.assert_allclose(np.median(off[before]), 0.05, atol=0.005)
     assert np.median(np.abs(off[~before])) < 0.008
 
