@@ -80,6 +80,7 @@ def row_of(task: Task) -> dict[str, Any]:
         if task.rough:
             row |= _left_out(calibration, found["target"], scenario["target"])
     row |= {"verdict": calibration["verdict"], "reasons": " | ".join(calibration["reasons"])}
+    row["told"] = "unseen_face_error" in calibration["warning_codes"]
     row |= {"codes": " ".join(dict.fromkeys(calibration["reason_codes"])), "faces": len(found["target"]["faces"])}
     return row | error_columns(calibration["methods"]["adjustment"], truth)
 

@@ -64,19 +64,21 @@ def _line(place: str, rows: pd.DataFrame) -> str:
 
 ROUGH_HEAD = """# Walls as they are
 
-Made by `python -m tools.place_campaign --rough --only {places}`, {sessions} sessions of each place, as in
-[places](places.md), and beside it by seed: growth on the wet faces of up to 3 cm that varies by up to 1.5 cm, faces
-uneven by up to 3 mm, splash; two fenders and a ladder at the largest wall, a footing of 15 to 50 cm along it in every
-second session, a moored boat before it in three of ten. In every second session one wet face stands off by 8 to 30 cm,
-or is turned by 0.6 to 2°, which nobody knows. The limits are those of `purpose: order_1a`. `slip` is a wall with two
-returns between two slopes.
+Made by `python -m tools.place_campaign --rough --only {places} --sessions {sessions}`, so many sessions of each
+place, as in [places](places.md), and beside it by seed: growth on the wet faces of up to 3 cm that varies by up to
+1.5 cm, faces uneven by up to 3 mm, splash; two fenders and a ladder at the largest wall, a footing of 15 to 50 cm along
+it in every second session, a moored boat before it in three of ten. In every second session one wet face stands off by
+8 to 30 cm, or is turned by 0.6 to 2°, which nobody knows. The limits are those of `purpose: order_1a`. `slip` is a wall
+with two returns between two slopes.
 
 """
 ROUGH_EXPLAINED = """
 A false face is left out of the adjustment, or the faces are in doubt and the session is rejected; heights with a
-footing, a fender's end or splash are left out besides. The plan is that of the session's passes at the found faces but
-for the false one, with the walls' true roughness (`as_built.roughness_m`). Growth of one thickness on all walls looks
-like a lever arm: no test shows it, and `as_built.growth_sigma_m` (1.5 cm) has it in the sigmas.
+footing, a fender's end or splash are left out besides. Where nothing else shows what a face shows, it cannot be tested:
+"told" are the sessions with the warning that a wall may be off unnoticed, and what it would do to the mount. The plan
+is that of the session's passes at the found faces but for the false one, with the walls' true roughness
+(`as_built.roughness_m`). Growth of one thickness on all walls looks like a lever arm: no test shows it, and
+`as_built.growth_sigma_m` (1.5 cm) has it in the sigmas.
 """
 
 
@@ -85,7 +87,7 @@ def summary_of_rough(table: pd.DataFrame) -> str:
     heads = (
         "place", "accepted", "of those that the plan allows", "worst error ÷ σ of accepted", "largest NSE of accepted",
         "rejected for sigmas alone", "mean NSE of both", "otherwise rejected", "for", "false faces left out, in doubt",
-        "other faces left out",
+        "told of the rest", "other faces left out",
     )  # fmt: skip
     lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
     groups = [(str(place), rows.reset_index(drop=True)) for place, rows in table.groupby("place", sort=False)]
@@ -111,12 +113,14 @@ def _line_of_rough(place: str, rows: pd.DataFrame) -> str:
     doubted = codes.map(lambda words: "faces_in_doubt" in words.split())
     each = zip(doubted, pairs, strict=True)
     doubts = sum(doubt and bool(fault) and fault not in names for doubt, (fault, names) in each)
+    unseen = np.array([bool(fault) and fault not in names for fault, names in pairs]) & ~doubted.to_numpy(bool)
+    told = int(rows["told"].fillna(value=False).astype(bool)[unseen].sum())
     allowed = rows["allowed"].fillna(value=False).astype(bool)
     more = sum(len({name for name in names if not name.startswith("?")} - {fault}) for fault, names in pairs)
     cells = (
         place, f"{int(accepted.sum())} of {len(rows)}", f"{int((accepted & allowed).sum())} of {int(allowed.sum())}",
         f"{worst:.1f}", f"{rows.loc[accepted, 'nse_total'].max():.0f}", str(int(weak.sum())),
         f"{rows.loc[accepted | weak, 'nse_total'].mean():.1f}", str(len(others)), reasons,
-        f"{found}, {doubts} of {len(false)}", str(more),
+        f"{found}, {doubts} of {len(false)}", f"{told} of {int(unseen.sum())}", str(more),
     )  # fmt: skip
     return f"| {' | '.join(cells)} |"
