@@ -78,6 +78,7 @@ CODES = {
     "footprint near an edge": "footprint_near_edge",
     "footprint partly on another face": "footprint_on_two_faces",
     "ray too flat": "grazing_ray",
+    "masked": "masked",
 }
 
 # Codes of reasons with a variable part, by a pattern of the reason. CODES has precedence.

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from pipeline.config.quantities import Model
-from pipeline.config.target import FaceName
+from pipeline.config.target import FaceName, Masks
 from pipeline.config.yaml_models import parse
 from pipeline.errors import ConfigError
 
@@ -20,11 +20,12 @@ DEPTHS_M = (0.5, 100.0)  # those that may be given
 
 
 class Found(Model):
-    """What is said of a target that is to be found: how deep its faces go on, and which of them are struck."""
+    """What is said of a target that is to be found: how deep its faces go on, which are struck, and masks by face."""
 
     kind: Literal["found"]
     depth_m: Annotated[float, Field(ge=DEPTHS_M[0], le=DEPTHS_M[1])] = DEPTH_M
     strike: tuple[FaceName, ...] = ()  # faces that are no wall below the water
+    masks: dict[FaceName, Masks] = Field(default_factory=dict)  # parts of faces that do not count
 
 
 class _OfPool(Model):
@@ -47,7 +48,7 @@ def with_found(content: dict[str, Any], path: Path, find: Find | None) -> dict[s
     Raises
     ------
     ConfigError
-        There is nothing to find it in, or a face to be struck is not among those that were found.
+        There is nothing to find it in, or a face to be struck or masked is not among those that were found.
     """
     target = content.get("target")
     if not isinstance(target, dict) or target.get("kind") != "found":
@@ -60,10 +61,12 @@ def with_found(content: dict[str, Any], path: Path, find: Find | None) -> dict[s
         )
     found = find(wanted)
     faces = found["target"]["faces"]
-    for name in wanted.strike:
-        if name not in faces:
-            raise ConfigError(f"{path}: target.strike: {name!r}: no such face was found, but {', '.join(faces)}")
-    left = {name: face for name, face in faces.items() if name not in wanted.strike}
+    for key, names in (("strike", wanted.strike), ("masks", tuple(wanted.masks))):
+        for name in names:
+            if name not in faces:
+                raise ConfigError(f"{path}: target.{key}: {name!r}: no such face was found, but {', '.join(faces)}")
+    masks = {name: {"masks": [one.model_dump(mode="json") for one in each]} for name, each in wanted.masks.items()}
+    left = {name: face | masks.get(name, {}) for name, face in faces.items() if name not in wanted.strike}
     if not left:
         raise ConfigError(f"{path}: target.strike: no face is left of {', '.join(faces)}; leave one, or more")
     built = content.get("as_built")

@@ -74,12 +74,35 @@ class Letters(Model):
         return "target.low_side"
 
 
+class MaskSettings(Model):
+    """A part of a face where no point counts, for a ladder or a fender is before it.
+
+    along_m: from the face's middle, to the right as the boat sees it; height_m: above the water. One may be left out.
+    """
+
+    along_m: tuple[Lever, Lever] = (-100.0, 100.0)
+    height_m: tuple[Lever, Lever] = (-100.0, 100.0)
+
+    @model_validator(mode="after")
+    def _in_order(self) -> "MaskSettings":
+        for name, (low, high) in (("along_m", self.along_m), ("height_m", self.height_m)):
+            if low >= high:
+                raise ValueError(f"{name}: [{low:g}, {high:g}]: the first must be the smaller one")
+        if not self.model_fields_set:
+            raise ValueError("needs along_m, height_m, or both; to leave out the whole face, strike it")
+        return self
+
+
+Masks = Annotated[tuple[MaskSettings, ...], Field(max_length=100)]
+
+
 class FaceSettings(Model):
     """A planar convex polygon: corners in the target frame, counter-clockwise as the sensors see it."""
 
     corners: Annotated[tuple[tuple[Lever, Lever, Lever], ...], Field(min_length=3, max_length=60)]
     seen: Literal["both", "dry", "wet"] = "both"  # dry: by the laser only; wet: by the sonar only
     role: Literal["P1", "P2", "P3"] | None = None  # in the patent's steps
+    masks: Masks = ()  # parts that do not count
 
 
 RelationKind = Literal["same_plane", "distance", "height", "parallel"]

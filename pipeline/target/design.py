@@ -4,6 +4,7 @@ from dataclasses import replace
 from functools import lru_cache
 
 from pipeline.config.target import FaceSettings, Letters, RelationSettings, Target
+from pipeline.maths.target.face import Mask
 from pipeline.maths.target.model import TargetModel
 from pipeline.maths.target.outlines import Outline, Relation, build_target
 from pipeline.maths.target.patent_target import PatentDimensions, patent_outlines
@@ -34,6 +35,12 @@ def _by_letters(target: Letters) -> TargetModel:
     return build_target(outlines, relations, target.water_level_m, repeats_m)
 
 
+def _masks(face: FaceSettings, water_level_m: float) -> tuple[Mask, ...]:
+    return tuple(
+        (*mask.along_m, water_level_m + mask.height_m[0], water_level_m + mask.height_m[1]) for mask in face.masks
+    )
+
+
 @lru_cache(maxsize=16)
 def _by_faces(
     faces: tuple[tuple[str, FaceSettings], ...],
@@ -42,7 +49,9 @@ def _by_faces(
     repeats_m: float | None,
     found: bool,
 ) -> TargetModel:
-    outlines = [Outline(name, face.corners, face.role or "", face.seen) for name, face in faces]
+    outlines = [
+        Outline(name, face.corners, face.role or "", face.seen, _masks(face, water_level_m)) for name, face in faces
+    ]
     stated = [
         Relation(kind, names, relation.name or "") for relation in relations for kind, names in relation.given.items()
     ]

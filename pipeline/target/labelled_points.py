@@ -170,4 +170,4 @@ def _counts(other_side: str, own_side: NDArray[np.bool_], near: int, edge: str, 
         edge: int(labels.near_edge.sum()),
         "ray too flat": int(labels.grazing.sum()),
         "used": int((labels.face >= 0).sum()),
-    }
+    } | ({"masked": int(labels.masked.sum())} if labels.masked.any() else {})

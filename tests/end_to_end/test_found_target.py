@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 import pytest
 import yaml
 
@@ -74,6 +75,35 @@ def test_it_is_found_once_and_again_when_what_it_depends_on_changes(dock: Path, 
     assert min(corner[2] for corner in faces(folders[0])["wall-1"]["corners"]) == pytest.approx(-3.0, abs=0.1)
 
 
+def test_a_mask_leaves_out_a_part_of_a_face_for_both_sensors(dock: Path, tmp_path: Path) -> None:
+    """What is left of the points on wall-2 lies beyond the mask; all others are as they were."""
+    folder, mask = tmp_path / "run", {"along_m": [0.5, 1.5], "height_m": [-2.0, 1.0]}
+    labels = []
+    for masks in ({}, {"wall-2": [mask]}):
+        file = config(tmp_path, masks=masks)
+        told = poolcal("run", dock, "--config", file, "--run", folder, "--no-report", "--no-recordings")
+        assert told.status in (0, 1), told.err
+        labels.append({
+            name: pd.read_parquet(folder / "segment" / name) for name in ("laser_labelled", "soundings_labelled")
+        })  # fmt: skip
+    names = pd.read_parquet(folder / "segment" / "faces.parquet").set_index("name")
+    wall = names.index.get_loc("wall-2")
+    whole, masked = (one["laser_labelled"] for one in labels)
+    lost = whole.merge(masked, on="t_ns", how="left", indicator=True, suffixes=("", "_"))
+    lost = lost[lost["_merge"] == "left_only"]
+    assert set(lost["face"]) == {wall}
+    right, height = -lost["y_target_m"], lost["z_target_m"]  # the wall looks to -x, its middle is the origin
+    assert right.between(0.3, 1.7).all()
+    assert height.between(0.0, 1.2).all()
+    assert len(lost) > 300
+    left = masked[masked["face"] == wall]
+    assert not ((-left["y_target_m"]).between(0.55, 1.45) & left["z_target_m"].between(-2.0, 0.95)).any()
+    soundings = [int((one["soundings_labelled"]["face"] == wall).sum()) for one in labels]
+    assert 0.6 < soundings[1] / soundings[0] < 0.95
+    counts = pd.read_parquet(folder / "segment" / "counts.parquet")
+    assert (counts.loc[counts["reason"] == "masked", "count"] > 100).sum() == 2
+
+
 @pytest.mark.parametrize("damaged", ["", "[1]", '{"key": "', '{"key": 1, "found": {}}'])
 def test_a_damaged_memory_is_none(dock: Path, tmp_path: Path, damaged: str) -> None:
     folder = tmp_path / "run"
@@ -91,6 +121,12 @@ def test_what_says_nothing_true_is_refused(dock: Path, tmp_path: Path) -> None:
     everything = config(tmp_path, strike=["wall-1", "wall-2", "wall-3"])
     one_line(run(dock, everything, folder), "target.strike", "no face is left")
     one_line(run(dock, config(tmp_path, depth_m=-4), folder), "target.depth_m")
+    for name, mask, words in (
+        ("wall-9", {"along_m": [0.0, 1.0]}, "target.masks: 'wall-9': no such face was found, but wall-1, wall-2"),
+        ("wall-1", {"along_m": [1.0, 0.0]}, "along_m: [1, 0]: the first must be the smaller one"),
+        ("wall-1", {}, "needs along_m, height_m, or both; to leave out the whole face, strike it"),
+    ):
+        one_line(run(dock, config(tmp_path, masks={name: [mask]}), folder), "target.masks", words)
     one_line(run(dock, config(tmp_path, faces={}), folder), "target.faces")
     assert begun(dock, config(tmp_path), folder).status == 0  # the folder is as good as new
     one_line(run(dock, config(tmp_path), dock / "run"), "lies in the session folder")

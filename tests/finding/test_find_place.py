@@ -142,5 +142,6 @@ def test_the_page_names_each_face_and_says_why_others_do_not_serve() -> None:
     for row in table_rows(place):
         assert all(f">{cell}</td>" in page for cell in row if cell)
     assert "strike: [wall-1]" in page
+    assert "masks: { wall-1: [{along_m: [0.5, 1.0], height_m: [-1.0, 1.0]}] }" in page
     nothing = replace(place, faces=())
     assert place_page(nothing, "harbour").count("<img") == 1

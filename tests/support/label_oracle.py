@@ -156,6 +156,7 @@ class _Candidates:
             off_surface=free & ~self.near_plane,
             near_edge=near_edge,
             grazing=free & self.too_flat,
+            masked=np.zeros(len(free), dtype=bool),
         )
 
 

@@ -7,11 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.maths.geometry.face_grid import face_axes
+from pipeline.maths.surfaces.flatness import plane_axes
 
 Array = NDArray[np.float64]
 
 HORIZONTAL_COSINE = 0.9998  # smallest |n_z| of a horizontal face: within 1.1°
 SAME_CORNER_M = 0.01  # corners nearer than this to each other are the same
+Mask = tuple[float, float, float, float]  # along the face from its middle, low and high; z, low and high; m
 TOUCH_M = 0.005  # a corner nearer than this to a plane lies in it
 
 
@@ -35,6 +37,8 @@ class Face:
         The sensors that use the face: "dry" (the laser alone), "wet" (the sonar alone) or "both".
     creases_m
         Lines (2, 3) within the face along which another face meets it.
+    masks_m
+        Parts in which no point counts.
     outer_edges
         Whether each edge, from its corner to the next, is an outer corner of the target: another face turns away from
         this one along the whole edge. Any other edge may be an inner corner.
@@ -50,6 +54,7 @@ class Face:
     seen: str = "both"
     creases_m: tuple[Array, ...] = ()
     outer_edges: tuple[bool, ...] = ()
+    masks_m: tuple[Mask, ...] = ()
 
     @property
     def level(self) -> bool:
@@ -120,6 +125,16 @@ class Face:
             np.minimum(smallest, np.maximum(aside, beyond), out=smallest)
         return smallest
 
+    def masked(self, points_m: Array, margin_m: float) -> NDArray[np.bool_]:
+        """Return whether points (n, 3) on the face lie in one of its masks, or nearer to one than a margin."""
+        right = plane_axes(self.normal)[0]
+        ends = self.vertices_m @ right
+        along, found = points_m @ right - (ends.min() + ends.max()) / 2, np.zeros(len(points_m), dtype=bool)
+        for left_m, right_m, low_m, high_m in self.masks_m:
+            beside = np.maximum(left_m - along, along - right_m)
+            found |= np.maximum(beside, np.maximum(low_m - points_m[:, 2], points_m[:, 2] - high_m)) < margin_m
+        return found
+
     def mirrored(self) -> "Face":
         """Return the face with left and right exchanged, y -> -y; its corners run the other way round."""
         flip = np.array([1.0, -1.0, 1.0])
@@ -128,6 +143,7 @@ class Face:
             normal=self.normal * flip,
             vertices_m=self.vertices_m[::-1] * flip,
             creases_m=tuple(line * flip for line in self.creases_m),
+            masks_m=tuple((-right, -left, low, high) for left, right, low, high in self.masks_m),
             outer_edges=(*self.outer_edges[-2::-1], *self.outer_edges[-1:]),
         )
 

@@ -69,7 +69,8 @@ class Labels:
 
     The masks are of the points without a face. off_surface: the ray meets no face's polygon within the gate and the
     heights; grazing: it meets one too flat, or from behind; near_edge: it meets one, and the footprint with its margin
-    does not lie within the polygon.
+    does not lie within the polygon; masked: it would have the face, but
+    lies in a mask of it, or nearer to one than the margin.
     """
 
     face: NDArray[np.int16]
@@ -78,6 +79,7 @@ class Labels:
     off_surface: Flags
     near_edge: Flags
     grazing: Flags
+    masked: Flags
 
 
 class BeamsOnFaces(Protocol):
@@ -182,14 +184,26 @@ def label_points(
     every = np.ones(n, dtype=bool) if among is None else np.require(among, bool, ("C", "W"))
     scratch = kernel.LabelScratch(np.empty(3), np.empty(3), np.empty((3, 3)))
     kernel.label(block(points_m.T), every, _beam_arrays(beams), model.tables(settings.seen), limits, labels, scratch)
+    masked = _masked(model, labels.face, points_m, settings.margin_m)
     return Labels(
-        face=labels.face,
+        face=np.where(masked, np.int16(NO_FACE), labels.face),
         cos_incidence=labels.cosine,
         edge_weight=labels.edge_weight,
         off_surface=labels.reason == kernel.OFF_SURFACE,
         near_edge=labels.reason == kernel.NEAR_EDGE,
         grazing=labels.reason == kernel.GRAZING,
+        masked=masked,
     )
+
+
+def _masked(model: TargetModel, face_of_point: NDArray[np.int16], points_m: Array, margin_m: float) -> Flags:
+    """Return which points (n,) lie in a mask of their face, or nearer to one than the margin."""
+    found = np.zeros(len(points_m), dtype=bool)
+    for number, face in enumerate(model.faces):
+        if face.masks_m:
+            rows = np.flatnonzero(face_of_point == number)
+            found[rows] = face.masked(points_m[rows], margin_m)
+    return found
 
 
 def near_planes(model: TargetModel, points_m: Array, reach_m: float, among: Flags, seen: str) -> Flags:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import ConfigError
-from pipeline.maths.target.face import HORIZONTAL_COSINE, TOUCH_M, Face, plane_of
+from pipeline.maths.target.face import HORIZONTAL_COSINE, TOUCH_M, Face, Mask, plane_of
 from pipeline.maths.target.model import ROLES, Family, TargetModel, names_in_order
 
 Array = NDArray[np.float64]
@@ -27,12 +27,13 @@ SMALLEST_M = 0.05  # a face smaller than the square of this side is refused
 
 @dataclass(frozen=True)
 class Outline:
-    """A face with its corners (k, 3) m, counter-clockwise as the sensors see them; ``seen`` as in Face."""
+    """A face with its corners (k, 3) m, counter-clockwise as the sensors see them; ``seen``, ``masks_m`` as in Face."""
 
     name: str
     corners: Sequence[Sequence[float]]
     role: str = ""
     seen: str = "both"
+    masks_m: tuple[Mask, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -87,6 +88,7 @@ def build_target(
             sense=sense,
             offset_m=0.0 if family.one_plane else sense * distance_m - family.distance_m,
             seen=outline.seen,
+            masks_m=outline.masks_m,
         )
         faces.append(face)
     faces = _with_corners(faces)

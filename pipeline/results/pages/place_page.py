@@ -89,7 +89,7 @@ def _elevation(axes: Axes, face: FoundFace, place: FoundPlace) -> PathCollection
     """Draw one face; return its dots, for the colours."""
     plane = face.plane
     along, height, off = plane.sample_m.T
-    middle = float(plane.middle_m[0])
+    middle = float(face.continued_m[:, 0].min() + face.continued_m[:, 0].max()) / 2  # that of masks
     dots = axes.scatter(
         along - middle, height - place.level_m, c=1000 * off, s=1.2, linewidths=0, rasterized=True,
         cmap=OFF_COLOURS, vmin=-OFF_MM, vmax=OFF_MM,

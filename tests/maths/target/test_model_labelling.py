@@ -7,6 +7,7 @@ import pytest
 
 from pipeline.maths.target.beams import TargetBeams
 from pipeline.maths.target.labelling import LabelSettings, label_points
+from pipeline.maths.target.outlines import Outline, build_target
 from tests.support.targets import by_letters, members
 
 
@@ -21,6 +22,24 @@ def named(model, name):
 
 def corners(face):
     return {tuple(round(float(v), 9) for v in vertex) for vertex in face.vertices_m}
+
+
+def test_masks_leave_out_points_by_place_and_height_on_both_sides_of_their_limits():
+    """A wall toward the boat at x < 0, of 6 m round y = 1: to the right as the boat sees it is -y. Water at 0.5 m."""
+    outline = Outline("wall", [[0, 4, -4], [0, -2, -4], [0, -2, 2], [0, 4, 2]], masks_m=((1.0, 1.5, -1.5, 1.0),))
+    model = build_target([outline], [], 0.5, None)
+    places = np.array([[0.0, 1.0 - along, z] for along, z in (
+        (1.25, 0.0), (0.95, 0.0), (0.85, 0.0), (1.55, 0.0), (1.65, 0.0), (1.25, -1.55), (1.25, -1.65), (1.25, 1.05),
+        (1.25, 1.15), (-1.25, 0.0),
+    )])  # fmt: skip
+    labels = label_points(model, places, TargetBeams.head_on(len(places)), LabelSettings(0.05, 0.1, 0.1))
+    masked = [True, True, False, True, False, True, False, True, False, False]
+    assert labels.masked.tolist() == masked
+    assert labels.face.tolist() == [-1 if hidden else 0 for hidden in masked]
+    there = label_points(
+        model.mirrored(), places * [1, -1, 1], TargetBeams.head_on(len(places)), LabelSettings(0.05, 0.1, 0.1)
+    )
+    assert there.masked.tolist() == masked
 
 
 def test_the_wall(target):
