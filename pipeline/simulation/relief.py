@@ -22,8 +22,8 @@ _CELLS_OF_LENGTH = 4  # in the length over which it is alike
 class _Field:
     """A random field of sigma 1 with the correlation exp(-d² / 2 length²): white noise on a lattice, smoothed.
 
-    The lattice is turned at random and repeats. No face is parallel to it, so that a face does not meet itself again.
-    Linear interpolation takes some of the variance: with the correlation ρ of neighbours (2 + ρ) / 3 is left by axis.
+    The lattice is turned at random, and repeats after 32 lengths along its own axes. Its mean is zero: otherwise all
+    repetitions would share one. Linear interpolation takes some of the variance: with the correlation ρ of neighbours (2 + ρ) / 3 is left by axis.
     """
 
     def __init__(self, seed: int, name: str, length_m: float) -> None:
@@ -36,7 +36,7 @@ class _Field:
         white = random.standard_normal((_CELLS, _CELLS, _CELLS), dtype=np.float32)
         smooth = gaussian_filter(white, _CELLS_OF_LENGTH / np.sqrt(2), mode="wrap")
         left = (2 + np.exp(-0.5 / _CELLS_OF_LENGTH**2)) / 3
-        self._lattice = smooth / (smooth.std() * left**1.5)
+        self._lattice = (smooth - smooth.mean()) / (smooth.std() * left**1.5)
 
     def at(self, points_m: Floats) -> Floats:
         """Return the field (n,) at points (n, 3)."""

@@ -3,18 +3,18 @@
 In pass p a block B of a wall has the mean M_Bp, less a line along the wall. What is alike in all passes has the
 variance V = E M_Bp M_Bq over pairs of passes (:mod:`~pipeline.maths.adjustment.roughness`).
 
-Whether V is certain says the analysis of variance of one factor, the block (Fisher 1925, "Statistical methods for
+The analysis of variance of one factor, the block, says whether V is certain (Fisher 1925, "Statistical methods for
 research workers", 40): with P passes, S₁ = Σ_B (Σ_p M_Bp)² / P and S₂ = Σ M_Bp² - S₁,
 
     F = (S₁ / (n - 2)) / (S₂ / ((P - 1)(n - 2)))
 
-has Fisher's distribution without roughness, if blocks of a pass are independent. All tests of a surface together have
-the chance of an error that 3 sigmas have. (A normal limit for V, whose distribution is skew, found roughness on 6 of 16
+has Fisher's distribution without roughness, if blocks of a pass are independent. All tests of a place together have the
+chance of an error that 3 sigmas have. (A normal limit for V, whose distribution is skew, found roughness on 6 of 16
 places with smooth walls.) Where drift makes the blocks of a pass alike, the scatter of the estimates by pairs of passes
 shows it: V must exceed 3 of its sigmas, too.
 
 Few pairs cannot be tested, because V is never above E M²: there roughness is likely where V makes four fifths of it. On
-a wall that one pass alone has seen it cannot be told from the pass's errors: all of E M² beyond noise is V.
+a wall that one pass alone has seen, roughness cannot be told from the pass's errors: all of E M² beyond noise is V.
 """
 
 import math
@@ -39,12 +39,11 @@ LEAST_SHARE = 0.1  # of the usual weight of a block: one with less is not used
 class OfBlocks:
     """What blocks of one size say.
 
-    added, patch_m: ω G, and √V in m, zero if V is negative; certain: whether V is; tested: by the analysis of variance;
-    dof: degrees of freedom of V.
+    added: ω G, below zero if V is; certain: whether V is certain, or likely where it is not tested; tested: by the
+    analysis of variance; dof: degrees of freedom of V.
     """
 
     added: float = 0.0
-    patch_m: float = 0.0
     certain: bool = False
     tested: bool = False
     dof: int = 0
@@ -59,11 +58,11 @@ class PlacedLines:
     place_m: Array
     run: Integers
 
-    def by_size(self) -> list[OfBlocks]:
-        """Return what blocks of each size say."""
-        return [self._of_blocks(size) for size in SIZES_M]
+    def by_size(self, walls: int = 1) -> list[OfBlocks]:
+        """Return what blocks of each size say; ``walls``: how many are tested at the place."""
+        return [self._of_blocks(size, LARGEST_CHANCE / walls) for size in SIZES_M]
 
-    def _of_blocks(self, size_m: float) -> OfBlocks:
+    def _of_blocks(self, size_m: float, chance: float) -> OfBlocks:
         number = np.floor((self.place_m - self.place_m.min()) / size_m).astype(np.int64)
         runs, run = np.unique(self.run, return_inverse=True)
         shape = len(runs), int(number.max()) + 1
@@ -76,7 +75,7 @@ class PlacedLines:
             if use.sum() >= FEWEST_BLOCKS:
                 of_block = total[k][use] / weight[k][use]
                 mean[k, use], used[k] = _without_line(np.flatnonzero(use).astype(float), of_block, weight[k][use]), use
-        return _of_block_means(mean, np.where(used, weight, 0.0), used)
+        return _of_block_means(mean, np.where(used, weight, 0.0), used, chance)
 
 
 def _without_line(place: Array, value: Array, weight: Array) -> Array:
@@ -86,36 +85,32 @@ def _without_line(place: Array, value: Array, weight: Array) -> Array:
     return np.asarray(value - design @ line)
 
 
-def _of_block_means(mean: Array, weight: Array, used: NDArray[np.bool_]) -> OfBlocks:
-    """Return what block means (passes, blocks) say, with their weights; zero where not used."""
+def _of_block_means(mean: Array, weight: Array, used: NDArray[np.bool_], chance: float) -> OfBlocks:
+    """Return what block means (passes, blocks) say, with their weights; zero where not used; chance: of a test."""
     count = used.sum(axis=0)
     n, pairs = int(np.sum(count > 0)), float(np.sum(count * (count - 1)) / 2)
     if n < FEWEST_BLOCKS or (pairs == 0 and len(mean) > 1):
         return OfBlocks()
-    squares, of_block = np.sum(mean**2, axis=0), weight.sum(axis=0)
+    squares, of_block, tested = np.sum(mean**2, axis=0), weight.sum(axis=0), False
     mean_square = squares.sum() / count.sum()
     if pairs > 0:
         V = np.sum(mean.sum(axis=0) ** 2 - squares) / 2 / pairs
-        if pairs <= FEWEST_PAIRS:  # of so few no V is certain, for it is never above E M²
+        alike = _chance(mean, used) if pairs > FEWEST_PAIRS else None
+        tested = alike is not None
+        if alike is None:  # of so few no V is certain, for it is never above E M²
             certain = MOSTLY_ALIKE * mean_square < V
         else:
-            certain = CERTAIN * _sigma_by_pairs(mean, used) < V and _chance(mean, used) < LARGEST_CHANCE
+            certain = CERTAIN * _sigma_by_pairs(mean, used) < V and alike < chance
     else:
         noise = np.mean(1 / of_block[count > 0])
         V = mean_square - noise
         certain = CERTAIN * noise * np.sqrt(2 / n) < V
-    V = max(float(V), 0.0) * n / (n - DETREND)
-    return OfBlocks(
-        added=V * float(np.sum(of_block**2) / np.sum(of_block)),
-        patch_m=float(np.sqrt(V)),
-        certain=bool(certain),
-        tested=pairs > FEWEST_PAIRS,
-        dof=n - DETREND,
-    )
+    V *= n / (n - DETREND)
+    return OfBlocks(V * float(np.sum(of_block**2) / np.sum(of_block)), bool(certain), tested, n - DETREND)
 
 
-def _chance(mean: Array, used: NDArray[np.bool_]) -> float:
-    """Return the chance that the block means of passes are as much alike without roughness, by the F test."""
+def _chance(mean: Array, used: NDArray[np.bool_]) -> float | None:
+    """Return the chance that block means are as much alike without roughness, by the F test; None: too few for it."""
     from scipy.special import fdtrc
 
     count = used.sum(axis=0)
@@ -124,6 +119,8 @@ def _chance(mean: Array, used: NDArray[np.bool_]) -> float:
     own = np.sum(mean**2) - alike
     dof_alike = blocks_seen - DETREND
     dof_own = count.sum() - DETREND * passes - dof_alike
+    if dof_own < 1 or own <= 0:
+        return None
     return float(fdtrc(dof_alike, dof_own, alike / dof_alike / (own / dof_own)))
 
 

@@ -18,19 +18,18 @@ all passes, and errors of the pass (noise, drift), which are not. So for two pas
 The mean over blocks and pairs of passes is the estimate of V. Each pass is first freed of a line in y, which drift may
 give it and surfaces' parameters take up; of n blocks this takes 2 degrees of freedom, so V counts n / (n - 2) times.
 
-Whether V is certain says a test (:mod:`~pipeline.maths.adjustment.rough_blocks`). Only where no wall of the place has
-enough blocks for it, what makes roughness likely on a wall holds for this wall.
+A test says whether V is certain (:mod:`~pipeline.maths.adjustment.rough_blocks`). On a wall with too few blocks for it,
+what makes roughness likely holds for this wall.
 
-Where the test finds V certain on one wall of a place, all its walls are likely rough, for they stand in the same
-water. There V of the means of the shortest blocks, of which there are most, holds on each wall, certain or not, but for
-a negative one.
+Where the test finds V certain on one wall of a place, all its walls are likely rough. There V of the means of the
+shortest blocks, of which there are most, holds on each wall, certain or not, but for a negative one. All walls together
+say by how much s V(s) grows from there, the most of all sizes; V falls with s, so at most as s does. Where the long
+blocks of one wall say more, and are certain, they hold.
 
-A short wall has few long blocks. So its short blocks say how rough it is, and all walls of the place together say by
-how much s V(s) grows from there, the most of all sizes. Where the long blocks of one wall say more, they hold.
-
-G of a wall with n blocks has the relative variance 2 / (n - 2), large for a short wall. Say the walls of a place differ
-in G by half of it, τ = 1/2. Then the best mean of a wall's own G and that of the place, by all walls together, gives
-the place the weight of 2 / τ² = 8 blocks. A wall too short for blocks is as rough as the place.
+G H (H: the height of the lines, see below) of a wall with n blocks that are independent has the relative variance
+2 / (n - 2), large for a short wall. Say the walls of a place differ in it by half of it, τ = 1/2. Then the best mean of
+a wall's own G H and that of the place, by all walls together, gives the place the weight of 2 / τ² = 8 blocks. A wall
+too short for blocks is as rough as the place.
 
 Before anything is sailed, G follows from a field of the RMS r, the same in all directions, with the correlation
 exp(-d² / 2 l²) at a distance d. The mean over a line of height H has the covariance ∫ C dz / H with another if H is
@@ -64,7 +63,7 @@ OF_PLACE = 8  # degrees of freedom that the place's roughness counts as
 
 @dataclass(frozen=True)
 class Roughness:
-    """Roughness by surface, (s,) each: what it adds to the design effects, and the RMS (m) of patches of the wall."""
+    """Roughness by surface, (s,) each: what it adds to the design effects, and the RMS (m) of its shortest blocks."""
 
     added: Array
     patch_m: Array
@@ -115,51 +114,72 @@ def roughness(
     gap_s : float
         A longer time (s) without observations separates passes.
     """
-    added, certain, tested = np.zeros((3, 2, len(surfaces), len(SIZES_M)))
-    per_length, dof, patch_m = np.zeros((3, len(surfaces)))
+    shape = 2, len(surfaces), len(SIZES_M)
+    added, certain, tested = np.zeros(shape), np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
+    per_length, dof, height_m = np.zeros(len(surfaces)), np.zeros(len(surfaces)), np.ones(len(surfaces))
     lines = Lines.of(sums, surfaces, np.zeros(N_POSE))
     place, run = _places(sums, surfaces, body, drift), _runs(lines.record, body.seconds, gap_s)
-    for number in range(len(surfaces)):
+    walls = np.unique(lines.surface)
+    for number in walls.tolist():
         rows = np.flatnonzero(lines.surface == number)
-        if not len(rows):
-            continue
-        along, sloping = _along(place[rows]), lines.sloping[rows]
-        per_length[number] = lines.total[rows].sum() / max(float(np.ptp(along)), SIZES_M[0])
-        means = PlacedLines(lines.mean[rows], lines.total[rows], along, run[rows]).by_size()
-        dof[number], patch_m[number] = means[0].dof, max(one.patch_m for one in means)
-        rows, along, slopes = rows[sloping], along[sloping], [OfBlocks()] * len(SIZES_M)
+        along, total = _along(place[rows]), lines.total[rows].sum()
+        per_length[number] = total / max(float(np.ptp(along)), SIZES_M[0])
+        height_m[number] = max(float(np.sqrt(12 * lines.spread[rows].sum() / total)), SIZES_M[0])
+        means = PlacedLines(lines.mean[rows], lines.total[rows], along, run[rows]).by_size(len(walls))
+        dof[number], slopes = means[0].dof, [OfBlocks()] * len(SIZES_M)
+        sloping = lines.sloping[rows]
+        rows, along = rows[sloping], along[sloping]
         if len(rows):
             sense = np.where(lines.along[rows] @ lines.along[rows[0]] < 0, -1.0, 1.0)
-            slopes = PlacedLines(sense * lines.slope[rows], lines.spread[rows], along, run[rows]).by_size()
-        for values, name in ((added, "added"), (certain, "certain"), (tested, "tested")):
-            values[:, number] = [[getattr(one, name) for one in by_size] for by_size in (means, slopes)]
-    if np.any(tested):
-        of_place = certain * tested
-        of_place[0, :, 0] = 1.0
-        effects = all_walls(added * of_place, per_length, dof) * np.any(certain * tested)
-    else:
-        effects = np.max(added * certain, axis=(0, 2))
-    return Roughness(effects, np.where(effects > 0, patch_m, 0.0))
+            placed = PlacedLines(sense * lines.slope[rows], lines.spread[rows], along, run[rows])
+            slopes = placed.by_size(len(walls))
+        for kind, by_size in enumerate((means, slopes)):
+            added[kind, number] = [one.added for one in by_size]
+            certain[kind, number] = [one.certain for one in by_size]
+            tested[kind, number] = [one.tested for one in by_size]
+    return Walls(added, certain, tested, per_length, height_m, dof).roughness()
 
 
-def all_walls(added: Array, per_length: Array, dof: Array) -> Array:
-    """Return the effects ω G (s,) of walls, as all walls of the place together show them.
+@dataclass(frozen=True)
+class Walls:
+    """What the blocks of all walls say: by means and slopes of lines, wall, and size of the blocks, (2, s, k) each.
 
-    Parameters
-    ----------
-    added : (2, s, k) array
-        ω G by the means and by the slopes of lines, by wall and size of the blocks, the shortest first.
-    per_length : (s,) array
-        ω, zero for a wall without lines.
-    dof : (s,) array
-        Degrees of freedom of the shortest blocks; zero where there are too few.
+    added: ω G, below zero where V is, zero without blocks; certain, tested: of V. By wall (s,): per_length: ω, zero for
+    a wall without lines; height_m: H of its lines; dof: degrees of freedom of the means of the shortest blocks.
     """
-    both = added[:, :, :1] * (added > 0)
-    total = both.sum(axis=(0, 1))
-    growth = max(1.0, float(np.max(added.sum(axis=(0, 1), where=both > 0) / np.where(total > 0, total, np.inf))))
-    G = np.maximum(growth * added[:, :, 0], added.max(axis=2)).max(axis=0) / np.where(per_length > 0, per_length, 1.0)
-    of_place = float(np.sum(dof * G) / max(np.sum(dof), 1.0))
-    return np.asarray(per_length * (dof * G + OF_PLACE * of_place) / (dof + OF_PLACE))
+
+    added: Array
+    certain: NDArray[np.bool_]
+    tested: NDArray[np.bool_]
+    per_length: Array
+    height_m: Array
+    dof: Array
+
+    def roughness(self) -> Roughness:
+        """Return the roughness of each wall, as all walls of the place show it together."""
+        reached = np.any(self.tested, axis=(0, 2))
+        counts = self.certain & (self.tested | ~reached[:, None])
+        effects = own = np.max(np.where(counts, self.added, 0.0), axis=(0, 2), initial=0.0)
+        if np.any(self.certain & self.tested):
+            of_means = np.maximum(self._growth() * self.added[0, :, 0], own)
+            shared = self._with_the_place(of_means)
+            effects = np.where(reached, shared, np.maximum(shared, own))
+        of_shortest = effects / np.where(self.per_length > 0, self.per_length, np.inf) / SIZES_M[0] / self._growth()
+        return Roughness(effects, np.sqrt(of_shortest))
+
+    def _growth(self) -> float:
+        """Return s V(s) of the size of blocks for which it is largest, over that of the shortest blocks."""
+        of_means = self.added[0]
+        shortest = np.sum(of_means[:, :1] * (of_means != 0), axis=0)
+        ratio = of_means.sum(axis=0) / np.where(shortest > 0, shortest, np.inf)
+        return float(np.clip(ratio, 1.0, np.array(SIZES_M) / SIZES_M[0]).max())
+
+    def _with_the_place(self, effects: Array) -> Array:
+        """Return effects (s,) in which each wall has G H of its own and that of the place."""
+        per_area = self.per_length / self.height_m
+        own = effects / np.where(per_area > 0, per_area, np.inf)
+        of_place = float(np.sum(self.dof * own) / max(np.sum(self.dof), 1.0))
+        return np.asarray(per_area * (self.dof * own + OF_PLACE * of_place) / (self.dof + OF_PLACE))
 
 
 def _runs(record: Integers, seconds: Array, gap_s: float) -> Integers:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.maths.adjustment.rough_blocks import SIZES_M, PlacedLines
-from pipeline.maths.adjustment.roughness import OF_PLACE, all_walls
+from pipeline.maths.adjustment.roughness import OF_PLACE, Walls
 
 Array = np.ndarray
 LENGTH_M, PINGS, PASSES = 12.0, 300, 4
@@ -124,23 +124,58 @@ def test_four_passes_of_a_short_wall_are_rough_where_it_is(sigma_m: float, low: 
     assert low <= np.mean(found) <= high
 
 
+def at_place(per_length: Array, G: Array, dof: Array, height_m: float | Array = 2.0, **changed: Array) -> Walls:
+    """Walls with blocks of all sizes that say the same; all are tested, and the first is certain."""
+    shape = 2, len(G), len(SIZES_M)
+    added = np.broadcast_to((per_length * G)[:, None], shape).copy()
+    first = np.zeros(shape, dtype=bool)
+    first[0, 0, 0] = True
+    values = {"added": added, "certain": first, "tested": np.ones(shape, dtype=bool)} | changed
+    return Walls(**values, per_length=per_length, height_m=np.broadcast_to(height_m, len(G)).astype(float), dof=dof)
+
+
 def test_a_short_wall_is_as_rough_as_the_place_and_a_long_one_as_it_is_itself() -> None:
-    """G is 3, 1 and 0 of walls with 100, 20 and 0 degrees of freedom, by blocks of all sizes alike; two are alike."""
-    per_length, dof = np.array([2.0, 5.0, 4.0, 0.0]), np.array([100, 20, 0, 0])
-    G = np.array([3.0, 1.0, 0.0, 0.0])
-    found = all_walls(np.tile((per_length * G)[:, None], (2, 1, len(SIZES_M))), per_length, dof)
+    """G is 3, 1 and 0 of walls with 100, 20 and 0 degrees of freedom; the last has no soundings."""
+    per_length, dof = np.array([2.0, 5.0, 4.0, 0.0]), np.array([100.0, 20.0, 0.0, 0.0])
+    found = at_place(per_length, np.array([3.0, 1.0, 0.0, 0.0]), dof).roughness()
     of_place = (100 * 3.0 + 20 * 1.0) / 120
-    assert found[2] == pytest.approx(4.0 * of_place)
-    assert found[1] == pytest.approx(5.0 * (20 * 1.0 + OF_PLACE * of_place) / (20 + OF_PLACE))
-    assert 0.95 < found[0] / 6.0 < 1.0
-    assert found[3] == 0.0
+    assert found.added[2] == pytest.approx(4.0 * of_place)
+    assert found.added[1] == pytest.approx(5.0 * (20 * 1.0 + OF_PLACE * of_place) / (20 + OF_PLACE))
+    assert 0.95 < found.added[0] / 6.0 < 1.0
+    assert found.added[3] == found.patch_m[3] == 0.0
+    np.testing.assert_allclose(found.patch_m[:3] ** 2 * SIZES_M[0] * per_length[:3], found.added[:3])
+
+
+def test_a_low_wall_averages_over_fewer_patches() -> None:
+    """Two walls of one field: over a height of 1 m the lines' means vary by four times as much as over 4 m."""
+    per_length, dof = np.ones(2), np.array([50.0, 0.0])
+    found = at_place(per_length, np.array([1.0, 0.0]), dof, np.array([4.0, 1.0])).roughness()
+    assert found.added[1] == pytest.approx(4.0)
 
 
 def test_the_growth_with_the_size_is_that_of_all_walls_together() -> None:
     """One wall shows by its long blocks that G is three times that of the short ones; the other has none so long."""
     added = np.zeros((2, 2, len(SIZES_M)))
     added[0, 0], added[0, 1] = [1.0, 2.0, 3.0, 3.0], [1.0, 0.0, 0.0, 0.0]
-    np.testing.assert_allclose(all_walls(added, np.ones(2), np.array([40.0, 40.0])), [3.0, 3.0])
+    found = at_place(np.ones(2), np.ones(2), np.array([40.0, 40.0]), added=added).roughness()
+    np.testing.assert_allclose(found.added, [3.0, 3.0])
+    added[0, 0] = [0.1, 9.0, 9.0, 9.0]  # s V(s) cannot grow faster than s
+    found = at_place(np.ones(2), np.ones(2), np.array([40.0, 40.0]), added=added).roughness()
+    assert found.added[1] <= 8.0
+
+
+def test_where_no_test_finds_roughness_short_walls_have_what_is_likely() -> None:
+    """The first wall is tested and smooth; the second is too short for a test, and its passes are nearly alike."""
+    shape = 2, 2, len(SIZES_M)
+    certain, tested = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
+    tested[:, 0], certain[0, 1, 0] = True, True
+    per_length, dof = np.ones(2), np.array([60.0, 2.0])
+    found = at_place(per_length, np.array([0.2, 7.0]), dof, certain=certain, tested=tested).roughness()
+    np.testing.assert_allclose(found.added, [0.0, 7.0])
+    certain[0, 0, 3] = True  # of the smooth wall: found where it has blocks for a test
+    tested[0, 0, 3] = False
+    found = at_place(per_length, np.array([0.2, 7.0]), dof, certain=certain, tested=tested).roughness()
+    np.testing.assert_allclose(found.added, [0.0, 7.0])
 
 
 def test_the_sharing_of_a_place_is_the_best_of_means() -> None:
@@ -148,7 +183,19 @@ def test_the_sharing_of_a_place_is_the_best_of_means() -> None:
     rng, dof = np.random.default_rng(4), 8
     own = np.maximum(rng.normal(1.0, 0.5, 4000), 0.0)
     seen = own * rng.chisquare(dof, len(own)) / dof
-    added = np.tile(seen[:, None], (2, 1, len(SIZES_M)))
-    shared = all_walls(added, np.ones(len(own)), np.full(len(own), float(dof)))
+    shared = at_place(np.ones(len(own)), seen, np.full(len(own), float(dof))).roughness().added
     wrong = [np.mean((values - own) ** 2) for values in (shared, seen, np.full(len(own), seen.mean()))]
     assert wrong[0] < 0.8 * min(wrong[1:])
+
+
+def test_passes_that_overlap_in_part_leave_no_error_for_a_test() -> None:
+    """Seven passes of four blocks, each farther by two: as many blocks and passes as means, so nothing is left over."""
+    rng = np.random.default_rng(2)
+    wall, place = field(rng, 0.2), np.linspace(0.0, 4.0, 4 * PINGS, endpoint=False)
+    parts = [place[(place >= 0.5 * k) & (place < 0.5 * k + 1.0)] for k in range(7)]
+    where, run = np.concatenate(parts), np.repeat(np.arange(7), [len(part) for part in parts])
+    value = wall(where) + 1e-5 * rng.normal(size=len(where))
+    with np.errstate(all="raise"):
+        found = PlacedLines(value, np.full(len(where), 1e10), where, run).by_size()[0]
+    assert not found.tested
+    assert found.added > 0
