@@ -114,6 +114,7 @@ def _line_of_rough(place: str, rows: pd.DataFrame) -> str:
     each = zip(doubted, pairs, strict=True)
     doubts = sum(doubt and bool(fault) and fault not in names for doubt, (fault, names) in each)
     unseen = np.array([bool(fault) and fault not in names for fault, names in pairs]) & ~doubted.to_numpy(bool)
+    unseen &= rows["faces"].notna().to_numpy(bool)
     told = int(rows["told"].fillna(value=False).astype(bool)[unseen].sum())
     allowed = rows["allowed"].fillna(value=False).astype(bool)
     more = sum(len({name for name in names if not name.startswith("?")} - {fault}) for fault, names in pairs)

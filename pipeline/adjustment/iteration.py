@@ -1,6 +1,6 @@
 """The iteration of the adjustment: read all points, solve and step, until neither values nor weights change."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -102,7 +102,11 @@ class MountAdjustment:
 
 
 def adjust_mount(
-    problem: CalibrationProblem, streams: Mapping[str, Stream], settings: IterationSettings, gap_s: float
+    problem: CalibrationProblem,
+    streams: Mapping[str, Stream],
+    settings: IterationSettings,
+    gap_s: float,
+    rough_to: Collection[str] = (),
 ) -> MountAdjustment:
     """Return the result of the iteration from the coarse mount to the solution.
 
@@ -116,6 +120,8 @@ def adjust_mount(
         Limits of the iteration, robust weights, additional parameters to estimate.
     gap_s : float
         A longer time (s) without observations interrupts the knots of the drift.
+    rough_to : collection of str
+        Sensors to which a test with more faces has shown that the place is rough.
     """
     prior = problem.prior
     figures, pings = DriftFigures.of_session(prior.noise), dict[str, PingNoise]()
@@ -124,7 +130,7 @@ def adjust_mount(
     # parameters that the points tell of, and that are known beforehand, are estimated with the last weights
     last, estimated = weighted.last, np.union1d(weighted.estimated, prior.known_parameters)
     factors: dict[str, EpochVarianceFactor] = {}
-    rough: dict[str, Roughness] = {}
+    rough = {sensor: Roughness.none(len(last.linearisation.state.surfaces), shown=True) for sensor in rough_to}
     converged = False
     if not weighted.deficient:
         # take the INS's noise from the data: white noise, then drift; further steps have the last weights

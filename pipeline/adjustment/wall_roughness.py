@@ -26,7 +26,7 @@ def with_roughness(
     last : Iterate
         The current values.
     before : mapping of Roughness
-        Roughness by sensor that the sums have.
+        Roughness by sensor that the sums have, or none of a place that a test has found rough before.
     body : BodyMotion
         The motion of the body.
     gap_s : float
@@ -35,10 +35,10 @@ def with_roughness(
     linearisation, found = last.linearisation, dict[str, Roughness]()
     surfaces = linearisation.state.surfaces
     for sensor, sums in last.linearisation.sums.items():
-        had = before.get(sensor, Roughness(np.zeros(len(surfaces)), np.zeros(len(surfaces))))
-        seen = roughness(sums, surfaces, body, last.drift, gap_s)
+        had = before.get(sensor, Roughness.none(len(surfaces)))
+        seen = roughness(sums, surfaces, body, last.drift, gap_s, had.shown)
         added = np.maximum(had.added, seen.added * (1 + had.added))
-        found[sensor] = Roughness(added, np.maximum(had.patch_m, seen.patch_m))
+        found[sensor] = Roughness(added, np.maximum(had.patch_m, seen.patch_m), seen.shown)
         times = (1 + added) / (1 + had.added)
         if np.any(times > 1):
             rougher = sums.stored(partial(with_design_effects, effects=DesignEffects(times, times)))

@@ -92,9 +92,10 @@ def adjust_true_faces(
     gates_m : mapping of float
         Largest distance of a labelled sounding from its face, as labelled, by head of the sonar.
     """
-    points, found, stripes = dict(streams), list[LeftOut](), list[Stripe]()
+    points, found, stripes, rough_to = dict(streams), list[LeftOut](), list[Stripe](), set[str]()
     for rounds in range(1, ROUNDS + 1):
-        adjustment = adjust_mount(problem, points, settings, gap_s)
+        adjustment = adjust_mount(problem, points, settings, gap_s, rough_to)
+        rough_to |= {sensor for sensor, rough in adjustment.rough.items() if rough.shown}
         if not problem.prior.from_start or adjustment.solution.deficiency:
             break
         profiles = {sensor: profiles_by_height(problem, adjustment, sensor, points[sensor]) for sensor in points}

@@ -75,20 +75,20 @@ class Letters(Model):
 
 
 class MaskSettings(Model):
-    """A part of a face where no point counts, for a ladder or a fender is before it.
+    """A part of a face where no point counts, because a ladder or a fender stands before it.
 
     along_m: from the face's middle, to the right as the boat sees it; height_m: above the water. One may be left out.
     """
 
-    along_m: tuple[Lever, Lever] = (-100.0, 100.0)
-    height_m: tuple[Lever, Lever] = (-100.0, 100.0)
+    along_m: tuple[Lever, Lever] | None = None
+    height_m: tuple[Lever, Lever] | None = None
 
     @model_validator(mode="after")
     def _in_order(self) -> "MaskSettings":
-        for name, (low, high) in (("along_m", self.along_m), ("height_m", self.height_m)):
-            if low >= high:
-                raise ValueError(f"{name}: [{low:g}, {high:g}]: the first must be the smaller one")
-        if not self.model_fields_set:
+        for name, limits in (("along_m", self.along_m), ("height_m", self.height_m)):
+            if limits and limits[0] >= limits[1]:
+                raise ValueError(f"{name}: [{limits[0]:g}, {limits[1]:g}]: the first must be the smaller one")
+        if self.along_m is None and self.height_m is None:
             raise ValueError("needs along_m, height_m, or both; to leave out the whole face, strike it")
         return self
 

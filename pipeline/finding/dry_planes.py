@@ -27,6 +27,7 @@ EDGE_CELL_M, EDGE_MARGIN_M = 0.1, 0.05  # the same of the last outline, where th
 BEYOND_M = VOXEL_M + MARGIN_M  # so far outside the first outline the last one may lie
 WAVES_M, OF_HEIGHT = 0.3, 0.25  # above the lowest points: waves, splash, the water's echoes; at most this share
 LEAST_M, UNEVEN_M, BOW_M, COVERED = 1.0, 0.03, 0.03, 0.6  # extent; RMS; height of a bow; share of the cells seen
+RISE_M, FEW_M2 = 0.4, 0.1  # least rise of its dry part; area of the densest plane with as many points as it needs
 LEVEL_DEG = 10.0  # a plane that is less inclined is a deck, a quay's top or the water
 NEAR_WATER_M = 0.5  # largest height of a plane's lower end above the water
 COLUMN_SPREAD_M, FEWEST_COLUMNS, FULL = 0.1, 6, 20  # columns of points that end at the water; points of a column
@@ -95,7 +96,18 @@ def dry_planes(points_m: Array, boat_m: Array, mapper: Mapper = serial) -> list[
     of_regions = (order[ends[k] : ends[k + 1]] for k in range(len(regions)))
     grown = (plane_of_voxels(voxels, rows) for rows in regions)
     found = mapper(partial(_plane, points_m, boat_m=boat_m), of_regions, grown)
-    return sorted(found, key=lambda plane: -plane.flat.width_m * plane.flat.height_m)
+    return _dense_enough(sorted(found, key=lambda plane: -plane.flat.width_m * plane.flat.height_m))
+
+
+def _dense_enough(planes: Sequence[DryPlane]) -> list[DryPlane]:
+    """Return the planes, with those refused besides that lie on a few points by chance, such as spray."""
+    densest = max((plane.points / area(plane.outline_m) for plane in planes if not plane.refused), default=0.0)
+    return [
+        replace(plane, refused=plane.refused or f"only {plane.points} points on it")
+        if plane.points < FEW_M2 * densest
+        else plane
+        for plane in planes
+    ]
 
 
 def _plane(all_m: Array, rows: Integers, grown: Plane, boat_m: Array) -> DryPlane:
@@ -148,7 +160,7 @@ def _plane(all_m: Array, rows: Integers, grown: Plane, boat_m: Array) -> DryPlan
 
 
 def _near_the_edge(points_m: Array, normal: Array, distance_m: float, coarse: Array, above_m: float) -> Array:
-    """Return the outline (k, 2) of small cells above a height, larger than the coarse one, if all have points.
+    """Return the outline (k, 2) of small cells above a height; the coarse one if they cover too little of it.
 
     Means of the outermost coarse cells lie up to half a cell inside the edge, and voxels at a corner belong to neither
     wall: together a fifth of a narrow wall's points.
@@ -194,6 +206,9 @@ def _refusal(plane: DryPlane) -> str:
         return "level"
     if min(flat.width_m, flat.height_m) < LEAST_M or len(plane.outline_m) < 3:
         return f"smaller than {LEAST_M:g} m"
+    rise_m = float(np.ptp(plane.corners_m(plane.outline_m)[:, 2]))
+    if rise_m < RISE_M:
+        return f"rises by {rise_m:.1f} m alone"
     if flat.uneven_m > UNEVEN_M:
         return f"uneven, {1000 * flat.uneven_m:.0f} mm"
     if flat.bow_m > BOW_M:

@@ -10,6 +10,7 @@ from pipeline.config.plan import Plan
 from pipeline.config.pool import PoolConfig, Segment
 from pipeline.config.session import Ins, Laser, Mbes, SessionConfig
 from pipeline.maths.adjustment.parameters import State
+from pipeline.maths.target.masks import along_face, outside_masks
 from pipeline.maths.target.model import TargetModel
 from pipeline.mount import mount_of
 from pipeline.target.design import target_of
@@ -47,7 +48,10 @@ class PredictionSetting:
         areas, number = np.zeros(len(self.state.surfaces)), {s.family: k for k, s in enumerate(self.state.surfaces)}
         for face in self.model.faces:
             centres_m, cell_m2 = face.cells(CELL_M)
-            areas[number[face.family]] += cell_m2 * np.sum(centres_m[:, 2] < self.model.water_level_m)
+            counts = centres_m[:, 2] < self.model.water_level_m
+            nothing = np.zeros(len(centres_m))
+            counts &= outside_masks(face, along_face(face, centres_m), centres_m[:, 2], (nothing, nothing)) > 0
+            areas[number[face.family]] += cell_m2 * np.sum(counts)
         return areas
 
 

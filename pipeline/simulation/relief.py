@@ -23,7 +23,8 @@ class _Field:
     """A random field of sigma 1 with the correlation exp(-d² / 2 length²): white noise on a lattice, smoothed.
 
     The lattice is turned at random, and repeats after 32 lengths along its own axes. Its mean is zero: otherwise all
-    repetitions would share one. Linear interpolation takes some of the variance: with the correlation ρ of neighbours (2 + ρ) / 3 is left by axis.
+    repetitions would share one. Linear interpolation takes some of the variance: with the correlation ρ of neighbours
+    (2 + ρ) / 3 is left by axis.
     """
 
     def __init__(self, seed: int, name: str, length_m: float) -> None:

@@ -3,11 +3,15 @@
 from dataclasses import replace
 from functools import lru_cache
 
+import numpy as np
+
 from pipeline.config.target import FaceSettings, Letters, RelationSettings, Target
 from pipeline.maths.target.face import Mask
 from pipeline.maths.target.model import TargetModel
 from pipeline.maths.target.outlines import Outline, Relation, build_target
 from pipeline.maths.target.patent_target import PatentDimensions, patent_outlines
+
+EVERYWHERE = (-np.inf, np.inf)
 
 
 def target_of(target: Target) -> TargetModel:
@@ -36,9 +40,8 @@ def _by_letters(target: Letters) -> TargetModel:
 
 
 def _masks(face: FaceSettings, water_level_m: float) -> tuple[Mask, ...]:
-    return tuple(
-        (*mask.along_m, water_level_m + mask.height_m[0], water_level_m + mask.height_m[1]) for mask in face.masks
-    )
+    limits = ((mask.along_m or EVERYWHERE, mask.height_m or EVERYWHERE) for mask in face.masks)
+    return tuple((*along, water_level_m + low, water_level_m + high) for along, (low, high) in limits)
 
 
 @lru_cache(maxsize=16)

@@ -65,6 +65,26 @@ def test_echoes_of_the_water_move_no_plane_and_no_outline() -> None:
     assert water_level_m([plane]) == pytest.approx(WATER_M, abs=0.05)
 
 
+def test_a_plane_of_few_points_is_chance() -> None:
+    """Beside a wall with 3000 points a square metre a small one with 600 serves, one with 200 does not."""
+    dense = np.concatenate([wall(8.0, 3.0, seed=seed) for seed in range(5)])
+    for every, serves in ((1, True), (3, False)):
+        beside = wall(1.4, 1.4)[::every] + np.array([3.0, 20.0, 0.0])
+        first, second = dry_planes(np.concatenate([dense, beside]), BOAT)[:2]
+        assert first.refused == ""
+        assert second.refused == ("" if serves else f"only {second.points} points on it"), every
+
+
+def test_a_low_bank_does_not_serve() -> None:
+    """A slope of 11° that rises by 0.76 m serves; one by 0.3 m, as a patch of waves might, does not."""
+    for length, serves in ((4.0, True), (1.6, False)):
+        upright = wall(6.0, length)
+        up = upright[:, 2] - WATER_M
+        bank = np.column_stack([upright[:, 0] + up * np.cos(np.radians(11.0)), upright[:, 1], WATER_M + 0.19 * up])
+        plane = largest(bank)
+        assert plane.refused == ("" if serves else f"rises by {0.19 * 1.6 * 0.5:.1f} m alone"), length
+
+
 def test_a_plain_wall_serves_and_looks_to_the_boat() -> None:
     plane = largest(wall(8.0, 3.0))
     assert plane.refused == ""

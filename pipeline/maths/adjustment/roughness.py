@@ -63,10 +63,19 @@ OF_PLACE = 8  # degrees of freedom that the place's roughness counts as
 
 @dataclass(frozen=True)
 class Roughness:
-    """Roughness by surface, (s,) each: what it adds to the design effects, and the RMS (m) of its shortest blocks."""
+    """Roughness by surface, (s,) each: what it adds to the design effects, and the RMS (m) of its shortest blocks.
+
+    shown: whether a test has found the place rough.
+    """
 
     added: Array
     patch_m: Array
+    shown: bool = False
+
+    @classmethod
+    def none(cls, surfaces: int, shown: bool = False) -> "Roughness":
+        """Return that of so many surfaces of which nothing is known, but whether a test has found the place rough."""
+        return cls(np.zeros(surfaces), np.zeros(surfaces), shown)
 
     @property
     def effects(self) -> DesignEffects:
@@ -98,6 +107,7 @@ def roughness(
     body: BodyMotion,
     drift: DriftEstimate,
     gap_s: float,
+    shown: bool = False,
 ) -> Roughness:
     """Return the roughness of the surfaces as one sensor sees it.
 
@@ -113,6 +123,8 @@ def roughness(
         The drift estimated so far.
     gap_s : float
         A longer time (s) without observations separates passes.
+    shown : bool
+        Whether a test has found the place rough already, as with more of its walls.
     """
     shape = 2, len(surfaces), len(SIZES_M)
     added, certain, tested = np.zeros(shape), np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
@@ -137,7 +149,7 @@ def roughness(
             added[kind, number] = [one.added for one in by_size]
             certain[kind, number] = [one.certain for one in by_size]
             tested[kind, number] = [one.tested for one in by_size]
-    return Walls(added, certain, tested, per_length, height_m, dof).roughness()
+    return Walls(added, certain, tested, per_length, height_m, dof).roughness(shown)
 
 
 @dataclass(frozen=True)
@@ -155,23 +167,24 @@ class Walls:
     height_m: Array
     dof: Array
 
-    def roughness(self) -> Roughness:
-        """Return the roughness of each wall, as all walls of the place show it together."""
+    def roughness(self, shown: bool = False) -> Roughness:
+        """Return the roughness of each wall, as all walls of the place show it together; ``shown``: before."""
         reached = np.any(self.tested, axis=(0, 2))
         counts = self.certain & (self.tested | ~reached[:, None])
         effects = own = np.max(np.where(counts, self.added, 0.0), axis=(0, 2), initial=0.0)
-        if np.any(self.certain & self.tested):
-            of_means = np.maximum(self._growth() * self.added[0, :, 0], own)
-            shared = self._with_the_place(of_means)
+        shown |= bool(np.any(self.certain & self.tested))
+        if shown:
+            of_slopes = np.where(counts[1, :, 0], self.added[1, :, 0], 0.0)
+            of_shortest = np.maximum(self.added[0, :, 0], of_slopes)
+            shared = self._with_the_place(np.maximum(self._growth() * of_shortest, own))
             effects = np.where(reached, shared, np.maximum(shared, own))
-        of_shortest = effects / np.where(self.per_length > 0, self.per_length, np.inf) / SIZES_M[0] / self._growth()
-        return Roughness(effects, np.sqrt(of_shortest))
+        V = effects / np.where(self.per_length > 0, self.per_length, np.inf) / SIZES_M[0] / self._growth()
+        return Roughness(effects, np.sqrt(V), shown)
 
     def _growth(self) -> float:
         """Return s V(s) of the size of blocks for which it is largest, over that of the shortest blocks."""
-        of_means = self.added[0]
-        shortest = np.sum(of_means[:, :1] * (of_means != 0), axis=0)
-        ratio = of_means.sum(axis=0) / np.where(shortest > 0, shortest, np.inf)
+        shortest = np.sum(self.added[:, :, :1] * (self.added != 0), axis=(0, 1))
+        ratio = self.added.sum(axis=(0, 1)) / np.where(shortest > 0, shortest, np.inf)
         return float(np.clip(ratio, 1.0, np.array(SIZES_M) / SIZES_M[0]).max())
 
     def _with_the_place(self, effects: Array) -> Array:

@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.maths.geometry.face_grid import face_axes
-from pipeline.maths.surfaces.flatness import plane_axes
 
 Array = NDArray[np.float64]
 
@@ -124,16 +123,6 @@ class Face:
             aside, beyond = np.abs(away @ across) - reach(across), np.abs(away @ along) - half - reach(along)
             np.minimum(smallest, np.maximum(aside, beyond), out=smallest)
         return smallest
-
-    def masked(self, points_m: Array, margin_m: float) -> NDArray[np.bool_]:
-        """Return whether points (n, 3) on the face lie in one of its masks, or nearer to one than a margin."""
-        right = plane_axes(self.normal)[0]
-        ends = self.vertices_m @ right
-        along, found = points_m @ right - (ends.min() + ends.max()) / 2, np.zeros(len(points_m), dtype=bool)
-        for left_m, right_m, low_m, high_m in self.masks_m:
-            beside = np.maximum(left_m - along, along - right_m)
-            found |= np.maximum(beside, np.maximum(low_m - points_m[:, 2], points_m[:, 2] - high_m)) < margin_m
-        return found
 
     def mirrored(self) -> "Face":
         """Return the face with left and right exchanged, y -> -y; its corners run the other way round."""

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from pipeline.maths.kernels import labels as kernel
 from pipeline.maths.kernels.compiled import block
 from pipeline.maths.target.beams import TargetBeams
+from pipeline.maths.target.masks import clear_of_masks
 from pipeline.maths.target.model import TargetModel
 
 Array = NDArray[np.float64]
@@ -69,8 +70,7 @@ class Labels:
 
     The masks are of the points without a face. off_surface: the ray meets no face's polygon within the gate and the
     heights; grazing: it meets one too flat, or from behind; near_edge: it meets one, and the footprint with its margin
-    does not lie within the polygon; masked: it would have the face, but
-    lies in a mask of it, or nearer to one than the margin.
+    does not lie within the polygon; masked: a part of the footprint, with its margin, lies in a mask of the face.
     """
 
     face: NDArray[np.int16]
@@ -184,26 +184,29 @@ def label_points(
     every = np.ones(n, dtype=bool) if among is None else np.require(among, bool, ("C", "W"))
     scratch = kernel.LabelScratch(np.empty(3), np.empty(3), np.empty((3, 3)))
     kernel.label(block(points_m.T), every, _beam_arrays(beams), model.tables(settings.seen), limits, labels, scratch)
-    masked = _masked(model, labels.face, points_m, settings.margin_m)
+    clear = _clear_of_masks(model, labels.face, points_m, beams, settings)
     return Labels(
-        face=np.where(masked, np.int16(NO_FACE), labels.face),
+        face=np.where(clear > 0, labels.face, np.int16(NO_FACE)),
         cos_incidence=labels.cosine,
-        edge_weight=labels.edge_weight,
+        edge_weight=np.minimum(labels.edge_weight, clear),
         off_surface=labels.reason == kernel.OFF_SURFACE,
         near_edge=labels.reason == kernel.NEAR_EDGE,
         grazing=labels.reason == kernel.GRAZING,
-        masked=masked,
+        masked=clear <= 0,
     )
 
 
-def _masked(model: TargetModel, face_of_point: NDArray[np.int16], points_m: Array, margin_m: float) -> Flags:
-    """Return which points (n,) lie in a mask of their face, or nearer to one than the margin."""
-    found = np.zeros(len(points_m), dtype=bool)
+def _clear_of_masks(
+    model: TargetModel, face_of_point: NDArray[np.int16], points_m: Array, beams: TargetBeams, settings: LabelSettings
+) -> Array:
+    """Return the weights (n,) of points by the ramp beside the masks of their faces, 0 in a mask."""
+    weight = np.ones(len(points_m))
     for number, face in enumerate(model.faces):
         if face.masks_m:
             rows = np.flatnonzero(face_of_point == number)
-            found[rows] = face.masked(points_m[rows], margin_m)
-    return found
+            spare_m = clear_of_masks(face, rows, points_m, beams, settings.margin_m, settings.spot_m)
+            weight[rows] = np.clip(spare_m / settings.ramp_m if settings.ramp_m else spare_m > 0, 0.0, 1.0)
+    return weight
 
 
 def near_planes(model: TargetModel, points_m: Array, reach_m: float, among: Flags, seen: str) -> Flags:

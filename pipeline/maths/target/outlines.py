@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from pipeline.errors import ConfigError
 from pipeline.maths.target.face import HORIZONTAL_COSINE, TOUCH_M, Face, Mask, plane_of
+from pipeline.maths.target.masks import MOST_LEVEL
 from pipeline.maths.target.model import ROLES, Family, TargetModel, names_in_order
 
 Array = NDArray[np.float64]
@@ -134,6 +135,11 @@ def _plane(outline: Outline) -> tuple[Array, float]:
     turns = np.cross(after - vertices, np.roll(after, -1, axis=0) - after) @ normal
     if np.any(turns <= 0):
         raise ConfigError(f"{where}: make no convex polygon; split the face into convex ones, tied by same_plane")
+    if outline.masks_m and abs(normal[2]) > MOST_LEVEL:
+        raise ConfigError(
+            f"target.faces.{outline.name}.masks: a level face has no left and right, and one height; leave the part "
+            "out of its corners"
+        )
     if looks_away(vertices, normal):
         raise ConfigError(
             f"{where}: the face looks away from the boat, which passes at x < 0; give its corners counter-clockwise as "

@@ -199,3 +199,12 @@ def test_passes_that_overlap_in_part_leave_no_error_for_a_test() -> None:
         found = PlacedLines(value, np.full(len(where), 1e10), where, run).by_size()[0]
     assert not found.tested
     assert found.added > 0
+
+
+def test_a_place_that_was_rough_with_more_walls_stays_rough() -> None:
+    nothing = np.zeros((2, 2, len(SIZES_M)), dtype=bool)
+    walls = at_place(np.ones(2), np.array([2.0, 1.0]), np.array([20.0, 20.0]), certain=nothing)
+    assert not walls.roughness().added.any()
+    again = walls.roughness(shown=True)
+    assert (again.added > 1.0).all()
+    assert again.shown

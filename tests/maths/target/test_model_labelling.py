@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipeline.errors import ConfigError
 from pipeline.maths.target.beams import TargetBeams
 from pipeline.maths.target.labelling import LabelSettings, label_points
 from pipeline.maths.target.outlines import Outline, build_target
@@ -36,10 +37,40 @@ def test_masks_leave_out_points_by_place_and_height_on_both_sides_of_their_limit
     masked = [True, True, False, True, False, True, False, True, False, False]
     assert labels.masked.tolist() == masked
     assert labels.face.tolist() == [-1 if hidden else 0 for hidden in masked]
+    assert (labels.edge_weight[~np.array(masked)] == 1.0).all()
     there = label_points(
         model.mirrored(), places * [1, -1, 1], TargetBeams.head_on(len(places)), LabelSettings(0.05, 0.1, 0.1)
     )
     assert there.masked.tolist() == masked
+
+
+def test_a_mask_does_not_tilt_the_face_at_its_edges():
+    """Slanted rays with noise in their ranges: what is left beside a mask stands off no more than all else. Weights
+    rise beside it over the ramp, and half of a footprint's length is kept."""
+    outline = Outline("wall", [[0, 4, -4], [0, -4, -4], [0, -4, 2], [0, 4, 2]], masks_m=((0.0, 0.5, -np.inf, np.inf),))
+    model, rng = build_target([outline], [], 0.0, None), np.random.default_rng(1)
+    origin, met = np.array([-3.0, 3.0, -1.0]), np.zeros((40_000, 3))
+    met[:, 1], met[:, 2] = rng.uniform(-1.5, 1.0, len(met)), -1.0
+    ray = (met - origin) / np.linalg.norm(met - origin, axis=1)[:, None]
+    points = met + ray * rng.normal(0, 0.03, len(met))[:, None]
+    across = np.cross(ray, [0.0, 0.0, 1.0]) * 0.01
+    beams = replace(TargetBeams.from_origins(np.tile(origin, (len(met), 1)), points), half_widths=(across, across))
+    labels = label_points(model, points, beams, LabelSettings(0.2, 0.015, 0.1, ramp_m=0.05))
+    for low, high in ((0.15, 0.3), (-0.8, -0.65)):  # y on either side of -0.5 to 0
+        beside = (met[:, 1] > low) & (met[:, 1] < high) & (labels.face == 0)
+        assert abs(np.mean(points[beside, 0])) < 0.003
+    kept = labels.face == 0
+    assert not kept[(met[:, 1] > -0.5) & (met[:, 1] < 0.0)].any()
+    half_m = 2 * 0.01 * np.linalg.norm(origin) / np.cos(np.arctan2(3.0, 3.0))  # of a footprint at y = 0: some cm
+    assert 0.015 < met[kept & (met[:, 1] > 0), 1].min() < 0.015 + half_m + 0.01
+    ramp = np.sort(labels.edge_weight[kept & (met[:, 1] > 0.0) & (met[:, 1] < 0.3)])
+    assert ramp[0] < 0.1 < ramp[-1] == 1.0
+
+
+def test_a_level_face_has_no_masks():
+    level = Outline("deck", [[0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], masks_m=((0.0, 0.5, -1.0, 1.0),))
+    with pytest.raises(ConfigError, match=r"deck\.masks: a level face has no left and right"):
+        build_target([level], [], 0.0, None)
 
 
 def test_the_wall(target):
