@@ -123,29 +123,27 @@ def adjust_mount(
     rough_to : collection of str
         Sensors to which a test with more faces has shown that the place is rough.
     """
-    prior = problem.prior
+    prior, converged = problem.prior, False
     figures, pings = DriftFigures.of_session(prior.noise), dict[str, PingNoise]()
     chosen = chosen_iteration(problem, streams, settings, gap_s)
     weighted = chosen.weighted
     # parameters that the points tell of, and that are known beforehand, are estimated with the last weights
     last, estimated = weighted.last, np.union1d(weighted.estimated, prior.known_parameters)
-    factors: dict[str, EpochVarianceFactor] = {}
+    factors = dict[str, EpochVarianceFactor]()
     rough = {sensor: Roughness.none(len(last.linearisation.state.surfaces), shown=True) for sensor in rough_to}
-    converged = False
     if not weighted.deficient:
         # take the INS's noise from the data: white noise, then drift; further steps have the last weights
-        factors["laser"] = last.record_noise(prior.noise)
-        last, pings = _with_ping_noise(last, prior.noise.white, factors["laser"])
-        factors |= {head: ping.epoch for head, ping in pings.items()}
-        noise = noise_seen_by_laser(prior.noise, factors["laser"])
+        laser = last.record_noise(prior.noise)
+        last, pings = _with_ping_noise(last, prior.noise.white, laser)
+        factors |= {"laser": laser} | {head: ping.epoch for head, ping in pings.items()}
+        noise = noise_seen_by_laser(prior.noise, laser)
         for _ in range(ROUGH_ROUNDS if prior.from_start else 1):
             if prior.from_start:  # a wall that nobody has surveyed may be rough
                 last, rough = with_roughness(last, rough, problem.model.body, gap_s)
             reduced = last.reduced(noise.white, estimated)
             figures = last.drift_figures(noise, prior.drift, estimated, reduced)
             last, converged = _closed(last, figures.noise, estimated, reduced)
-    # solve with the equations of all parameters: total covariance and tests need the fixed parameters
-    equations = last.equations(figures.noise)
+    equations = last.equations(figures.noise)  # of all parameters: total covariance and tests need the fixed ones
     solution = solve(equations.normal, equations.right, estimated.tolist(), last.prior.normal)
     return MountAdjustment(
         state=last.linearisation.state,
