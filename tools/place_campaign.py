@@ -131,8 +131,9 @@ def _predicted(
         ],
     }
     plan.write_text(yaml.safe_dump(content), encoding="utf-8")
-    status, _ = poolcal(["plan", plan, "--session", place, "--config", pool, "--yaml", out], (0, 1))
-    sigmas = yaml.safe_load(out.read_text("utf-8"))["given"]["sigma_mount_total"] or {}
+    status, _ = poolcal(["plan", plan, "--session", place, "--config", pool, "--yaml", out], (0, 1, 2))
+    given = yaml.safe_load(out.read_text("utf-8"))["given"] if status < 2 else {}  # 2: no plan with a mount so wrong
+    sigmas = given.get("sigma_mount_total") or {}
     keys = {"pitch": "pitch_deg", "roll": "roll_deg", "yaw": "yaw_deg", "x": "x_m", "y": "y_m", "z": "z_m"}
     return {"allowed": status == 0} | {
         f"planned_{name}": sigmas.get(key, np.nan) * (1000.0 if key.endswith("_m") else 1.0)
