@@ -120,7 +120,8 @@ def _line_of_rough(place: str, rows: pd.DataFrame) -> str:
     more = sum(len({name for name in names if not name.startswith("?")} - {fault}) for fault, names in pairs)
     cells = (
         place, f"{int(accepted.sum())} of {len(rows)}", f"{int((accepted & allowed).sum())} of {int(allowed.sum())}",
-        f"{worst:.1f}", f"{rows.loc[accepted, 'nse_total'].max():.0f}", str(int(weak.sum())),
+        f"{worst:.1f}" if accepted.any() else "",
+        f"{rows.loc[accepted, 'nse_total'].max():.0f}" if accepted.any() else "", str(int(weak.sum())),
         f"{rows.loc[accepted | weak, 'nse_total'].mean():.1f}", str(len(others)), reasons,
         f"{found}, {doubts} of {len(false)}", f"{told} of {int(unseen.sum())}", str(more),
     )  # fmt: skip
