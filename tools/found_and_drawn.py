@@ -39,7 +39,7 @@ FIRST_SEED = 90_000
 SAME_DEG, SAME_M = 1.0, 0.05  # a drawn face within these of a found plane lies in it
 HEAD = """# Found planes against drawn ones
 
-Made by `python -m tools.found_and_drawn`, {sessions} sessions each. In each session `kind: found` finds the target in
+Made by `python -m tools.found_and_drawn --sessions {sessions}`. In each session `kind: found` finds the target in
 the laser's points; then the session is calibrated again on the drawn target, with the same `as_built`. All
 errors are drawn by their sigmas, as in [places](places.md). In the first columns the values on the found target less
 those on the drawn one, RMS in total sigmas of the former.
