@@ -125,12 +125,12 @@ def adjust_mount(
     """
     prior, converged = problem.prior, False
     figures, pings = DriftFigures.of_session(prior.noise), dict[str, PingNoise]()
-    chosen = chosen_iteration(problem, streams, settings, gap_s)
+    rough = {sensor: Roughness.none(len(problem.model.coarse.surfaces), shown=True) for sensor in rough_to}
+    chosen = chosen_iteration(problem, streams, settings, gap_s, rough)
     weighted = chosen.weighted
     # parameters that the points tell of, and that are known beforehand, are estimated with the last weights
     last, estimated = weighted.last, np.union1d(weighted.estimated, prior.known_parameters)
     factors = dict[str, EpochVarianceFactor]()
-    rough = {sensor: Roughness.none(len(last.linearisation.state.surfaces), shown=True) for sensor in rough_to}
     if not weighted.deficient:
         # take the INS's noise from the data: white noise, then drift; further steps have the last weights
         laser = last.record_noise(prior.noise)

@@ -56,9 +56,16 @@ class ChosenIteration:
 
 
 def chosen_iteration(
-    problem: CalibrationProblem, streams: Mapping[str, Stream], settings: IterationSettings, gap_s: float
+    problem: CalibrationProblem,
+    streams: Mapping[str, Stream],
+    settings: IterationSettings,
+    gap_s: float,
+    rough: Mapping[str, Roughness] | None = None,
 ) -> ChosenIteration:
-    """Return the iteration with the smaller sum of squares; parameters as for :func:`weighted_iteration`."""
+    """Return the iteration with the smaller sum of squares; parameters as for :func:`weighted_iteration`.
+
+    ``rough``: by sensor, what is known of the roughness of the place.
+    """
     first = weighted_iteration(problem, streams, settings, gap_s)
     prior, coarse = problem.prior, problem.model.coarse
     may_differ = prior.from_start and not prior.of_mount(coarse) and "mbes" in streams and not first.deficient
@@ -72,11 +79,11 @@ def chosen_iteration(
     if second.deficient or not second.settled:
         return ChosenIteration(first)
     apart = _apart(first, second)
-    _, rough = with_roughness(first.last, {}, problem.model.body, gap_s)
-    squares, covariance = _minimum(first, problem, streams, first.weighting, rough)
+    _, seen = with_roughness(first.last, rough or {}, problem.model.body, gap_s)
+    squares, covariance = _minimum(first, problem, streams, first.weighting, seen)
     if float(apart @ np.linalg.solve(covariance, apart)) < SAME**2:
         return ChosenIteration(first)
-    excess = _minimum(second, problem, streams, first.weighting, rough)[0] - squares
+    excess = _minimum(second, problem, streams, first.weighting, seen)[0] - squares
     if excess > 0 and first.settled:
         return ChosenIteration(first, Rival(apart, float(np.sqrt(excess))))
     return ChosenIteration(second, Rival(-apart, float(np.sqrt(max(-excess, 0.0)))))

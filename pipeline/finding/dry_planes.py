@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from pipeline.artefacts.streams import Mapper, serial
 from pipeline.errors import RawDataError
+from pipeline.maths.adjustment.profiles import NORMAL
 from pipeline.maths.surfaces.flatness import Flatness, cells_of, flatness, plane_axes
 from pipeline.maths.surfaces.growing import GrowthLimits, Plane, grown_regions, plane_of_voxels
 from pipeline.maths.surfaces.outline import area, convex_hull, inside, shrunk, simplified
@@ -17,7 +18,7 @@ from pipeline.maths.surfaces.voxels import voxels_with_rows
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 VOXEL_M, CELL_M = 0.3, 0.25
-CUT, NORMAL, SMOOTH_M = 3.0, 1.4826, 0.001  # of robust sigmas of the cells; MAD of normal errors; least sigma
+CUT, SMOOTH_M = 3.0, 0.001  # of robust sigmas of the cells, and the least of these
 FEWEST, FEWEST_CELLS, REFITS = 4, 8, 5  # points of a cell, cells of a plane, fits of a plane to its cells
 GROWTH = GrowthLimits(thickness_m=0.03, distance_m=0.06, least_voxels=12)
 OFF_M = 0.15  # points of a plane's voxels farther off belong to something in front of it
