@@ -21,7 +21,7 @@ from pipeline.adjustment.residual_statistics import ResidualStatistics, residual
 from pipeline.adjustment.residual_tables import bins_table, map_table
 from pipeline.adjustment.result_tables import result_tables
 from pipeline.adjustment.wet_errors import outward_of, wet_faces_uncertain
-from pipeline.adjustment.wet_planes import adjust_true_faces
+from pipeline.adjustment.wet_planes import FaceLimits, adjust_true_faces
 from pipeline.artefacts.catalogue.points import FILES, INS_SIGMAS, PASSES, POSES
 from pipeline.artefacts.catalogue.results import (
     ADJUST_SUMMARY,
@@ -62,6 +62,7 @@ from pipeline.mount import mount_of
 from pipeline.planning.session_geometry import geometry_table, sailed_plan
 from pipeline.planning.setting import PredictionSetting
 from pipeline.target.design import target_of
+from pipeline.target.mount_search import farthest_correction
 
 
 @dataclass(frozen=True)
@@ -134,7 +135,8 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     points = {sensor: labelled[sensor] for sensor in problem.model.sigmas}
     found = {"mbes": inputs.provisional_mount, **inputs.mounts_of_further_heads}
     gates_m = {head: float(mount["gate_m"].iloc[0]) for head, mount in found.items() if head in points}
-    adjustment, points, left_out = adjust_true_faces(problem, points, config.adjust, config.ingest.max_gap_s, gates_m)
+    limits = FaceLimits(gates_m, farthest_correction(config.segment))
+    adjustment, points, left_out = adjust_true_faces(problem, points, config.adjust, config.ingest.max_gap_s, limits)
 
     # Compute the residuals of all points at the adjusted values, and make the tables.
     statistics = residual_statistics(problem, adjustment, points, inputs.passes, config.adjust)

@@ -9,10 +9,11 @@ each adjustment every wet face is tested (:mod:`~pipeline.maths.adjustment.plane
 * the face whose test is worst, if it exceeds the limit of all tests together, and explains more than any other. Then
   the rest is adjusted anew.
 
-Three rules keep this from hiding other errors. Where another face explains nearly as much, nobody can tell which of
+Four rules keep this from hiding other errors. Where another face explains nearly as much, nobody can tell which of
 them is wrong. An error of a sensor moves all faces: it may be one, where a parameter of a sensor explains nearly as
-much. And faces vote: more must be left than are left out. If a rule forbids it, nothing is left out, and the faces are
-in doubt, for which the verdict rejects.
+much. Faces vote: more must be left than are left out. And the tests are linear: where the adjustment has gone farther
+from the coarse mount than anyone measures wrong, they hold no more, and it may be any face. If a rule forbids it,
+nothing is left out, and the faces are in doubt, for which the verdict rejects.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -20,6 +21,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from pipeline.adjustment.face_errors import FinalSolution
 from pipeline.adjustment.iteration import MountAdjustment, adjust_mount
@@ -34,6 +36,7 @@ from pipeline.maths.adjustment.parameters import WET_PARAMETERS, kind_of
 from pipeline.maths.adjustment.plane_tests import PlaneTest, plane_test
 from pipeline.maths.adjustment.profiles import Profiles
 from pipeline.maths.adjustment.residual_means import BinMean
+from pipeline.maths.mount_parameters import too_far
 
 FEWEST_SOUNDINGS = 30  # on a family of faces: with fewer its labels are not reliable
 # Largest RMS of a family's residuals as a share of the gate. Noise of which a gate leaves k sigmas on either side has
@@ -42,6 +45,18 @@ LARGEST_SHARE_OF_GATE = 0.4
 ROUNDS = 8  # adjustments, at most
 LEVEL = 0.01  # of the tests of wet faces together: to leave out a good face costs little, to keep a bad one much
 NEARLY_AS_WELL = 9.0  # a fall of the sum of squares, 3 sigmas: explanations that differ by less are not told apart
+
+
+@dataclass(frozen=True)
+class FaceLimits:
+    """Limits beyond which faces are left out, or cannot be judged.
+
+    gates_m: largest distance of a labelled sounding from its face, as labelled, by head of the sonar; correction (6,):
+    of the coarse mount, rad and m.
+    """
+
+    gates_m: Mapping[str, float]
+    correction: NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -75,7 +90,7 @@ def adjust_true_faces(
     streams: Mapping[str, Stream],
     settings: Adjust,
     gap_s: float,
-    gates_m: Mapping[str, float],
+    limits: FaceLimits,
 ) -> tuple[MountAdjustment, dict[str, Stream], pd.DataFrame]:
     """Return the adjustment of the faces that agree, the points it has used, and table ``left_out``.
 
@@ -89,8 +104,8 @@ def adjust_true_faces(
         Limits of the iteration, robust weights, level of the tests.
     gap_s : float
         A longer time (s) without observations interrupts the knots of the drift.
-    gates_m : mapping of float
-        Largest distance of a labelled sounding from its face, as labelled, by head of the sonar.
+    limits : FaceLimits
+        Of the labels, and of the mount.
     """
     points, found, stripes, rough_to = dict(streams), list[LeftOut](), list[Stripe](), set[str]()
     for rounds in range(1, ROUNDS + 1):
@@ -99,11 +114,11 @@ def adjust_true_faces(
         if not problem.prior.from_start or adjustment.solution.deficiency:
             break
         profiles = {sensor: profiles_by_height(problem, adjustment, sensor, points[sensor]) for sensor in points}
-        more, off = _not_there(problem, profiles, gates_m), list[Stripe]()
+        more, off = _not_there(problem, profiles, limits.gates_m), list[Stripe]()
         if not more:
             all_off = stripes_off(problem, adjustment, profiles, settings.test_tolerance_m)
             off = [stripe for stripe in all_off if not stripe.within(stripes)]
-            more = [_of_stripe(problem, stripe) for stripe in off] or _contradicting(problem, adjustment, found)
+            more = [_of_stripe(problem, stripe) for stripe in off] or _contradicting(problem, adjustment, found, limits)
         seen = {number for name, number in adjustment.accumulation.groups if kind_of(name) == "mbes"}
         if rounds == ROUNDS or len({one.family for one in more if one.whole and one.sensor != "laser"}) >= len(seen):
             more = [replace(one, why="doubt") for one in more]  # nothing would be left, or it does not end
@@ -158,7 +173,7 @@ def _not_there(
 
 
 def _contradicting(
-    problem: CalibrationProblem, adjustment: MountAdjustment, before: Sequence[LeftOut]
+    problem: CalibrationProblem, adjustment: MountAdjustment, before: Sequence[LeftOut], limits: FaceLimits
 ) -> list[LeftOut]:
     """Return the surface that contradicts the others most; "doubt" with all that it may be if nobody can tell."""
     state, known, names = adjustment.state, problem.prior.parameters, adjustment.state.names
@@ -174,8 +189,12 @@ def _contradicting(
             if test.rank:  # a face that the sonar alone sees stands where it does
                 tests[number] = test, numbers
     count = sum(1 + len(numbers) for _, numbers in tests.values())
-    if not tests or max(test.deviate for test, _ in tests.values()) <= joint_limit(count, LEVEL):
+    largest = joint_limit(count, LEVEL)
+    suspects = [number for number, (test, _) in tests.items() if test.deviate > largest]
+    if not suspects:
         return []
+    if _gone_far(problem, adjustment, limits):
+        return [_off(adjustment, number, "doubt", *tests[number]) for number in suspects]
     falls = {number: test.fall for number, (test, _) in tests.items()}
     least = max(falls.values()) - NEARLY_AS_WELL
     final = FinalSolution(names, deviation, deviation, adjustment.equations, adjustment.solution)
@@ -185,6 +204,15 @@ def _contradicting(
     voted_out = 1 + sum(one.why == "off" for one in before)
     told = len(chosen) == 1 and max(others, default=0.0) <= least and 2 * voted_out < len(tests) + voted_out - 1
     return [_off(adjustment, number, "off" if told else "doubt", *tests[number]) for number in chosen]
+
+
+def _gone_far(problem: CalibrationProblem, adjustment: MountAdjustment, limits: FaceLimits) -> bool:
+    """Return whether a head's mount lies beyond the limits of the coarse one's correction."""
+    state, solution = adjustment.state, adjustment.solution
+    deviation, sigma = state.deviation_from(problem.model.coarse) + solution.step, np.zeros(state.size)
+    sigma[solution.estimated] = np.sqrt(np.diag(solution.covariance))
+    heads = [state.mount_columns(head) for head in state.heads]
+    return any(too_far(deviation[columns], sigma[columns], limits.correction) for columns in heads)
 
 
 def _off(adjustment: MountAdjustment, number: int, why: str, test: PlaneTest, parameters: Sequence[int]) -> LeftOut:

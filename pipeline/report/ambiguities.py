@@ -2,11 +2,12 @@
 
 from dataclasses import dataclass
 
+import numpy as np
 import pandas as pd
 
 from pipeline.config.pool import FARTHEST
 from pipeline.config.session import Calibrated
-from pipeline.maths.mount_parameters import MOUNT_WORDS
+from pipeline.maths.mount_parameters import MOUNT_NAMES, MOUNT_WORDS, too_far
 from pipeline.report.reason_codes import ReasonCode, Statement
 from pipeline.target.laser_search import LARGEST_TURN
 
@@ -81,6 +82,34 @@ def ambiguous_minimum(summary: pd.Series) -> list[Statement]:
         "turned to either side of that way sees nearly the same: pass a wall that looks another way, too"
     )
     return [Statement(ReasonCode.AMBIGUOUS_MOUNT, words)]
+
+
+def far_from_coarse(estimate: pd.DataFrame, search: MountSearch) -> list[Statement]:
+    """Return the reason that the adjusted mount lies beyond the limits of its search; empty if it does not.
+
+    Parameters
+    ----------
+    estimate : table ``estimate`` of the adjustment
+    search : limits of the mount's search
+    """
+    rows = estimate.set_index("unknown").loc[list(MOUNT_NAMES)]
+    value, sigma = (rows[name].to_numpy(np.float64) for name in ("value", "sigma_total"))
+    limits = np.repeat([np.radians(search.max_angle_deg), search.max_lever_arm_m], 3)
+    far = too_far(value, sigma, limits)
+    if not far:
+        return []
+    words = ", ".join(
+        f"{np.degrees(value[k]):+.1f}° in {MOUNT_WORDS[k]}" if k < 3 else f"{value[k]:+.2f} m in {MOUNT_WORDS[k]}"
+        for k in far
+    )
+    return [
+        Statement(
+            ReasonCode.MOUNT_FAR_FROM_COARSE,
+            f"the adjustment took the mount farther from the coarse one than {search.max_angle_deg:g}° and "
+            f"{search.max_lever_arm_m:g} m: {words}. Measure that again; if the coarse mount was right, a wall is not "
+            "where it should be below the water, or too few hold the mount, and no value of it is right",
+        )
+    ]
 
 
 def _ambiguous_pose(pose: pd.Series, shape: str, sides: str) -> Statement:

@@ -26,6 +26,7 @@ class ReasonCode(StrEnum):
     AMBIGUOUS_TARGET_POSE = "ambiguous_target_pose", "another pose of the target fits the laser points as well"
     TARGET_BEYOND_SEARCH = "target_beyond_search", "no pose of the target within the search limits fits"
     MOUNT_BEYOND_SEARCH = "mount_beyond_search", "no mount within the search limits brings the points onto the target"
+    MOUNT_FAR_FROM_COARSE = "mount_far_from_coarse", "the adjustment took the mount beyond the search limits"
     AMBIGUOUS_MOUNT = "ambiguous_mount", "another mount fits the soundings nearly as well"
 
     # The adjustment: these reject.

@@ -35,6 +35,12 @@ REMEDIES: dict[Code, Remedy] = {
         "units of the soundings are wrong, or the clocks differ.",
         "Run poolcal check. Correct the sign or value that the reason names, and run again.",
     ),
+    Code.MOUNT_FAR_FROM_COARSE: Remedy(
+        "A wall is not where it should be below the water, and too few others hold the mount against it. Or the coarse "
+        "mount is wrong by so much.",
+        "Measure the coarse mount again. If it was right, no value of the result is: see what is below the water, and "
+        "pass more walls, or faces that look another way.",
+    ),
     Code.AMBIGUOUS_MOUNT: Remedy(
         "A second mount fits the soundings nearly as well: mostly the coarse lever arm is a block (2 e) off. Where all "
         "walls look one way, it is the sonar turned to the other side of that way.",

@@ -8,6 +8,8 @@ The limits are defined at these places (paths from ``pipeline/``):
 * no result: ``RANK_TOLERANCE`` of maths/adjustment/solution.py;
 * convergence: ``max_iterations`` of class ``Adjust`` of config/pool.py, ``SETTLED`` of
   adjustment/weighted_iteration.py, ``CONVERGED`` and ``CLOSING_STEPS`` of adjustment/iteration.py;
+* a mount far from the coarse one: ``farthest_mount`` of class ``Segment``, ``SIGNIFICANT`` of
+  maths/mount_parameters.py;
 * another minimum of the adjustment: ``SAME`` of adjustment/two_starts.py, ``LEAST_STRENGTH`` of ambiguities.py;
 * number of soundings on a family, and its noise against the gate: ``FEWEST_SOUNDINGS`` and ``LARGEST_SHARE_OF_GATE``
   of adjustment/wet_planes.py; faces in doubt at unsurveyed walls: ``LEVEL``, ``NEARLY_AS_WELL`` and ``ROUNDS`` there,
@@ -42,7 +44,7 @@ import pandas as pd
 from pipeline.config.pool import Method
 from pipeline.config.verdict import VerdictLimits
 from pipeline.maths.mount_parameters import PARAMETERS
-from pipeline.report.ambiguities import MountSearch, ambiguities, ambiguous_minimum
+from pipeline.report.ambiguities import MountSearch, ambiguities, ambiguous_minimum, far_from_coarse
 from pipeline.report.coarse_mount import contradicted_coarse_mount
 from pipeline.report.evidence import Evidence
 from pipeline.report.hypotheses import Hypothesis, hypotheses
@@ -146,6 +148,7 @@ def rejections(
         gates_m[head.name or "mbes"] = head.evidence.provisional_mount["gate_m"].iloc[0]
         reasons += named(head.name, too_few_soundings(evidence.cells, head.name or "mbes"))
     reasons += faces_in_doubt(evidence.left_out)
+    reasons += [one for head in heads for one in named(head.name, _far_from_coarse(head))]
     reasons += _residual_reasons(evidence, criteria, drift_check)
     reasons += noise_cut_by_gate(evidence.cells, gates_m)  # a face that is off scatters too, and is named before
     reasons += disagreeing_parts(evidence.parts, criteria.test_level)
@@ -160,14 +163,19 @@ def rejections(
 
 
 def own_reasons(head: JudgedHead) -> list[Statement]:
-    """Return the reasons that are about one head alone: doubts about it, too few soundings, its limits."""
+    """Return the reasons that are about one head alone: doubts about it, too few soundings, a far mount, its limits."""
     if doubts := _doubts(head.evidence, head.criteria):
         return doubts
     return [
         *too_few_soundings(head.evidence.cells, head.name),
+        *_far_from_coarse(head),
         *_beyond_limits(head),
         *_patent_reasons(head),
     ]
+
+
+def _far_from_coarse(head: JudgedHead) -> list[Statement]:
+    return far_from_coarse(head.evidence.estimate, head.criteria.search)
 
 
 def _patent_reasons(head: JudgedHead) -> list[Statement]:

@@ -108,8 +108,12 @@ def _criteria(
         behind = closest.hides(placement.origins(p), placement.points(p), BEHIND_M)
         return surface_score(placement, p, closest, SCORE_REACH_M) - float(np.mean(behind))
 
-    limits = np.repeat(settings.farthest_mount, 3) * np.repeat([np.pi / 180, 1.0], 3)
-    return SearchCriteria(same, quality, limits)
+    return SearchCriteria(same, quality, farthest_correction(settings))
+
+
+def farthest_correction(settings: Segment) -> Array:
+    """Return the largest correction (6,) of each component of the coarse mount that is accepted, rad and m."""
+    return np.asarray(np.repeat(settings.farthest_mount, 3) * np.repeat([np.pi / 180, 1.0], 3))
 
 
 def _wet_labeller(

@@ -243,3 +243,13 @@ def test_what_only_shows_that_something_is_wrong_comes_after_the_cause():
     cause, residuals = judged(evidence(patterns=[OFF], freed={"value": 6e-4}))
     assert "likely cause of residuals (strength 6)" in cause.words
     assert residuals.code == ReasonCode.RESIDUALS_BY_ANGLE
+
+
+@pytest.mark.parametrize(("place", "limit"), [(0, np.radians(4.5)), (2, np.radians(4.5)), (3, 0.45), (5, 0.45)])
+def test_a_mount_is_far_from_the_coarse_one_beyond_the_search_by_three_sigmas(place, limit):
+    sigma = 1e-4  # of the evidence's estimate
+    for sign in (-1.0, 1.0):
+        for times, expected in ((2.9, []), (3.1, [ReasonCode.MOUNT_FAR_FROM_COARSE])):
+            value = np.zeros(6)
+            value[place] = sign * (limit + times * sigma)
+            assert codes(judged(evidence(value=value.tolist()))) == expected

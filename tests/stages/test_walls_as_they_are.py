@@ -20,13 +20,13 @@ SLIP: dict[str, Any] = of_faces(  # a wall with two returns, and a slipway
 ) | {"track": {"distances_m": [7.0, 9.0, 7.5, 8.5], "half_length_m": 8.0}}
 CORNER = of_faces({name: SLIP["target"]["faces"][name] for name in ("wall", "north")}, azimuth_deg=163.0)
 UNSURVEYED = {"as_built": {"offset_sigma_m": 0.02, "angle_sigma_deg": 0.1, "bow_sigma_m": 0.005}}
+INS = {"rate_hz": 50.0, "drift": {"horizontal_m": 0.01, "vertical_m": 0.01}}
 FOOTING = {"name": "footing", "low_m": [-0.07, -2.0, -4.0], "high_m": [0.0, 4.0, -3.0]}
 
 
 def at(place: dict[str, Any], *more: dict[str, Any], seed: int = 3) -> tuple[Any, dict[str, Any], dict[str, Any]]:
     """A session with wet faces of which nothing is known, its artefacts and its result."""
-    ins = {"rate_hz": 50.0, "drift": {"horizontal_m": 0.01, "vertical_m": 0.01}}
-    session = made(place, {"ins": ins}, *more, seed=seed)
+    session = made(place, {"ins": INS}, *more, seed=seed)
     found = calibrated(session, pool=UNSURVEYED)
     return session, found, json.loads(found["report/calibration.json"])
 
@@ -73,6 +73,13 @@ def test_where_two_faces_contradict_each_other_nobody_knows_which_is_wrong() -> 
     assert {why for _, why in left_out(found)} == {"doubt"}
     assert "faces_in_doubt" in result["reason_codes"]
     assert "left_out" not in result
+
+
+def test_where_the_mount_went_far_from_the_coarse_one_any_face_may_be_wrong() -> None:
+    """The session that names the turned face; but its coarse mount was off by more than its owner thought possible."""
+    session = made(SLIP, {"ins": INS}, fault(faces=["north"], turn_deg=[0.0, 1.2]), seed=3)
+    found = calibrated(session, pool=UNSURVEYED | {"segment": {"search_mount_m": 0.04}})
+    assert {why for _, why in left_out(found)} == {"doubt"}
 
 
 def test_an_error_of_a_sensor_is_not_blamed_on_a_wall() -> None:

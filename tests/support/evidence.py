@@ -47,6 +47,7 @@ def evidence(
     count: int = 500,
     rms_m: float = 0.01,
     left_out: Sequence[Mapping[str, Any]] = (),
+    value: Sequence[float] = (0.0,) * len(MOUNT_NAMES),
 ) -> Evidence:
     """Tables of a session that is accepted, with changes to their rows."""
     pose_row = {
@@ -92,7 +93,7 @@ def evidence(
         "geometry": pd.DataFrame(geometry, columns=["kind", "words"]),
         "freed": freed_table(nothing | dict(freed or {})),
         "sets": pd.DataFrame([of_set | dict(changes) for changes in sets]),
-        "estimate": pd.DataFrame({"unknown": MOUNT_NAMES, "sigma": 1e-4, "sigma_total": 1e-4}),
+        "estimate": pd.DataFrame({"unknown": MOUNT_NAMES, "value": value, "sigma": 1e-4, "sigma_total": 1e-4}),
         "left_out": left_out_table(*left_out),
         "patterns": pd.DataFrame([pattern | {"normalised": 0.3} | dict(changes) for changes in patterns]),
     }
