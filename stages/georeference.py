@@ -20,6 +20,7 @@ from pipeline.artefacts.catalogue.points import (
     SOUNDINGS,
     SOUNDINGS_POOL,
     TRAJECTORY,
+    WATER_LEVELS,
 )
 from pipeline.artefacts.counts import by_reason, counts_table, why_none_used
 from pipeline.artefacts.streams import EMPTY_STREAM, BatchResult, Chunk, Stream, point_array
@@ -30,6 +31,7 @@ from pipeline.config.target import Target
 from pipeline.errors import RawDataError
 from pipeline.georeference.placement import laser_in_pool, soundings_in_pool
 from pipeline.georeference.pool_context import PoolContext
+from pipeline.georeference.water_levels import water_levels
 from pipeline.gps_time import NS
 from pipeline.maths.geometry.passes import pass_of
 from pipeline.target.design import target_of
@@ -61,39 +63,49 @@ class Outputs:
     """Tables and streams that the stage writes."""
 
     poses: Annotated[pd.DataFrame, POSES]
+    water_levels: Annotated[pd.DataFrame, WATER_LEVELS]
     counts: Annotated[pd.DataFrame, GEOREFERENCE_COUNTS]
     laser_pool: Annotated[Stream, LASER_POOL] = EMPTY_STREAM
     soundings_pool: Annotated[Stream, SOUNDINGS_POOL] = EMPTY_STREAM
 
 
-def prepare(inputs: Inputs, config: Config) -> PoolContext:
+@dataclass(frozen=True)
+class Prepared:
+    """The poses of the INS in the pool frame, with the passes and the box round the target; the water by pass."""
+
+    context: PoolContext
+    levels_m: NDArray[np.float64]
+
+
+def prepare(inputs: Inputs, config: Config) -> Prepared:
     """Return the poses of the INS in the pool frame, with the passes and the box round the target."""
     low, high = target_of(config.target).bounds()
     margin = config.georeference.box_margin_m
-    return PoolContext.of(inputs.trajectory, inputs.passes, inputs.pool_frame, (low - margin, high + margin))
+    context = PoolContext.of(inputs.trajectory, inputs.passes, inputs.pool_frame, (low - margin, high + margin))
+    return Prepared(context, water_levels(config.target, context))
 
 
-def run_batch(source: str, chunk: Chunk, prepared: PoolContext, config: Config) -> BatchResult:
+def run_batch(source: str, chunk: Chunk, prepared: Prepared, config: Config) -> BatchResult:
     """Place the points of one chunk in the pool frame, and keep the points within the box round the target."""
-    columns = chunk.columns
+    columns, context = chunk.columns, prepared.context
     t_ns = columns["t_ns"]
-    number = pass_of(t_ns, prepared.starts_ns, prepared.ends_ns)
-    covered = prepared.trajectory.covers(t_ns, round(config.georeference.max_ins_interval_s * NS))
+    number = pass_of(t_ns, context.starts_ns, context.ends_ns)
+    covered = context.trajectory.covers(t_ns, round(config.georeference.max_ins_interval_s * NS))
     counts = {"outside every pass": int((number < 0).sum()), "hole in the INS": int(((number >= 0) & ~covered).sum())}
     rows = np.flatnonzero((number >= 0) & covered)
     if len(rows) < len(t_ns):
         columns = {name: values[rows] for name, values in columns.items()}
         t_ns, number = columns["t_ns"], number[rows]
     if source == "laser_points":
-        sensor, pool = laser_in_pool(t_ns, point_array(columns, "m"), prepared, config.laser)
+        sensor, pool = laser_in_pool(t_ns, point_array(columns, "m"), context, config.laser)
         inside = np.ones(len(t_ns), dtype=bool)
     elif config.mbes is not None:
-        sensor, pool, inside = soundings_in_pool(columns, prepared, config.mbes, config.target.water_level_m)
+        sensor, pool, inside = soundings_in_pool(columns, context, config.mbes, prepared.levels_m[number])
         counts["angle impossible with the given sound speed"] = int((~inside).sum())
     else:
         raise TypeError("soundings without a sonar")
     possible = int(inside.sum())
-    for values, low, high in zip(pool.T, prepared.box_low_m, prepared.box_high_m, strict=True):
+    for values, low, high in zip(pool.T, context.box_low_m, context.box_high_m, strict=True):
         inside &= (values >= low) & (values <= high)
     near = np.flatnonzero(inside)
     counts |= {"outside the box round the target": possible - len(near), "used": len(near)}
@@ -105,7 +117,7 @@ def run_batch(source: str, chunk: Chunk, prepared: PoolContext, config: Config) 
     return BatchResult({stream: kept}, counts)
 
 
-def combine(prepared: PoolContext, partials: dict[str, list[tuple[str, dict[str, int]]]], config: Config) -> Outputs:
+def combine(prepared: Prepared, partials: dict[str, list[tuple[str, dict[str, int]]]], config: Config) -> Outputs:
     """Return the poses and the sums of the counts.
 
     Raises
@@ -131,4 +143,5 @@ def combine(prepared: PoolContext, partials: dict[str, list[tuple[str, dict[str,
                 f"check target.origin, target.azimuth_deg and {placing}: poolcal check tells which sign, clock or "
                 "height would bring points there"
             )
-    return Outputs(poses=poses_table(prepared.trajectory), counts=counts)
+    levels = pd.DataFrame({"pass": np.arange(len(prepared.levels_m)), "level_m": prepared.levels_m})
+    return Outputs(poses=poses_table(prepared.context.trajectory), water_levels=levels, counts=counts)

@@ -8,6 +8,7 @@ import pandas as pd
 
 from pipeline.adjustment.error_sources import stated_of
 from pipeline.adjustment.ins_drift import drift_model, sigmas_from_files
+from pipeline.artefacts.catalogue.points import WATER_LEVELS
 from pipeline.artefacts.catalogue.results import CALIBRATION, CALIBRATION_JSON, CALIBRATION_YAML, CLOSING
 from pipeline.artefacts.schema import Provenance
 from pipeline.config.pool import Adjust, AsBuilt, LaserFit, Method, Segment
@@ -82,6 +83,7 @@ class Inputs(Evidence, OfHeads):
     """Tables of the earlier stages, and the run's provenance: digests of raw files, versions of software."""
 
     provenance: Annotated[dict[str, Any], Provenance]
+    water_levels: Annotated[pd.DataFrame, WATER_LEVELS]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,7 +98,7 @@ class Outputs:
 
 def run(inputs: Inputs, config: Config) -> Outputs:
     """Judge a calibration, and return it as documents for programs and for people."""
-    first, passes = evidence_of(inputs, inputs, FIRST), pass_rows(inputs.passes, inputs.cells)
+    first, passes = evidence_of(inputs, inputs, FIRST), pass_rows(inputs.passes, inputs.water_levels, inputs.cells)
     report = _sensor_report(first, config, passes)
     further = [_further_head(head, inputs, config) for head in config.further_heads]
     model = target_of(config.target)

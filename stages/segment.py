@@ -23,6 +23,7 @@ from pipeline.artefacts.catalogue.points import (
     POOL_FRAME,
     POSES,
     SOUNDINGS_POOL,
+    WATER_LEVELS,
 )
 from pipeline.artefacts.catalogue.target import (
     FACES,
@@ -88,6 +89,7 @@ class Inputs:
     ins_sigmas: Annotated[pd.DataFrame, INS_SIGMAS]
     pool_frame: Annotated[pd.DataFrame, POOL_FRAME]
     poses: Annotated[pd.DataFrame, POSES]
+    water_levels: Annotated[pd.DataFrame, WATER_LEVELS]
     counts: Annotated[pd.DataFrame, GEOREFERENCE_COUNTS]
     laser_pool: Annotated[Stream, LASER_POOL]
     soundings_pool: Annotated[Stream, SOUNDINGS_POOL]
@@ -150,6 +152,7 @@ def search(inputs: Inputs, config: Config) -> LabellingContext:
         mount=mount,
         trajectory=trajectory,
         corrected=trajectory,
+        levels_m=inputs.water_levels["level_m"].to_numpy(),
         laser=laser,
         laser_beam_m=config.laser.beam_m,
         mbes=config.mbes,

@@ -131,8 +131,9 @@ def _check_at_target(session: _Session, epochs: dict[str, Times], unusable: set[
     track = track_of(ins, frame, model, files, pool.ingest, sees_port(session.settings))
     findings = [
         *track_checks.sailing_findings(track, pool.target_place),
-        *track_checks.water_findings(track.legs, pool.segment.water_margin_m),
     ]
+    if pool.target.water_level_changes is None:
+        findings += track_checks.water_findings(track.legs, pool.segment.water_margin_m)
     usable = [sensor for sensor in ("laser", "mbes") if sensor in epochs and sensor not in unusable]
     of_points: list[Finding] = []
     counts = None

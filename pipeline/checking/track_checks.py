@@ -137,8 +137,8 @@ def water_findings(legs: Sequence[Leg], margin_m: float) -> Iterator[Finding]:
         yield Finding(
             "water",
             f"the boat lies {rise_m:.2f} m higher in the pass of {utc_text(high.start_ns)} than in that of "
-            f"{utc_text(low.start_ns)}: the water rose or fell, or the INS's height wandered; give "
-            f"target.water_level_m of the time between, and segment.water_margin_m: {margin_m + rise_m / 2:.2f}",
+            f"{utc_text(low.start_ns)}: the water rose or fell, or the INS's height wandered. If "
+            "the heights are sure (RTK fixed), write target.water_level_changes: ins, or name a file of readings there",
             "look",
         )
 

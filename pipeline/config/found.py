@@ -12,6 +12,7 @@ from pydantic import Field
 
 from pipeline.config.quantities import Model
 from pipeline.config.target import FaceName, Masks
+from pipeline.config.water_level import WaterLevelChanges
 from pipeline.config.yaml_models import parse
 from pipeline.errors import ConfigError
 
@@ -26,6 +27,7 @@ class Found(Model):
     depth_m: Annotated[float, Field(ge=DEPTHS_M[0], le=DEPTHS_M[1])] = DEPTH_M
     strike: tuple[FaceName, ...] = ()  # faces that are no wall below the water
     masks: dict[FaceName, Masks] = Field(default_factory=dict)  # parts of faces that do not count
+    water_level_changes: WaterLevelChanges | None = None  # null: the level stays
 
 
 class _OfPool(Model):
@@ -71,4 +73,5 @@ def with_found(content: dict[str, Any], path: Path, find: Find | None) -> dict[s
         raise ConfigError(f"{path}: target.strike: no face is left of {', '.join(faces)}; leave one, or more")
     built = content.get("as_built")
     as_built = found["as_built"] | built if isinstance(built, dict) else built or found["as_built"]
-    return content | {"target": {**found["target"], "faces": left}, "as_built": as_built}
+    of_water = {key: target[key] for key in ("water_level_changes",) if key in target}
+    return content | {"target": {**found["target"], "faces": left, **of_water}, "as_built": as_built}

@@ -41,7 +41,7 @@ def laser_in_pool(
 
 
 def soundings_in_pool(
-    columns: Batch, context: PoolContext, mbes: SonarPlacement, water_level_m: float
+    columns: Batch, context: PoolContext, mbes: SonarPlacement, water_level_m: float | Array
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Return soundings (n, 3) m in the mbes frame and in the pool frame, and a mask (n,): true for possible ones.
 
@@ -54,7 +54,7 @@ def soundings_in_pool(
     mbes
         The sonar's mount, sound speed and cast.
     water_level_m
-        Height of the water, pool frame.
+        Height of the water, or heights (n,), pool frame.
     """
     t_ns, recorded_m_s = columns["t_ns"], columns["sound_speed_m_s"]
     sensor, possible = points_in_mbes(

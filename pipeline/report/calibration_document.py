@@ -104,13 +104,13 @@ def correlation_matrix(covariance: pd.DataFrame) -> list[list[float]] | None:
     return values.tolist() if np.all(np.isfinite(values)) else None
 
 
-def pass_rows(passes: pd.DataFrame, cells: pd.DataFrame) -> list[dict[str, Any]]:
-    """Return a row for each pass: start, distance, duration, and the observations on the target by table ``cells``.
+def pass_rows(passes: pd.DataFrame, water_levels: pd.DataFrame, cells: pd.DataFrame) -> list[dict[str, Any]]:
+    """Return a row for each pass: start, distance, duration, water, and the target's observations by table ``cells``.
 
     Of a sonar with several heads the soundings are also counted by head.
     """
     rows, heads = [], sorted({"mbes", *cells["sensor"]} - {"laser"})
-    for row in passes.to_dict("records"):
+    for row in passes.merge(water_levels, on="pass").to_dict("records"):
         means = cells[cells["pass"] == row["pass"]]
         on_target = {sensor: int(means.loc[means["sensor"] == sensor, "count"].sum()) for sensor in ("laser", *heads)}
         rows.append(
@@ -119,6 +119,7 @@ def pass_rows(passes: pd.DataFrame, cells: pd.DataFrame) -> list[dict[str, Any]]
                 "start_utc": utc_text(int(row["start_ns"])),
                 "distance_m": json_number(round(row["distance_m"], 2)),
                 "duration_s": json_number(round(row["duration_s"], 1)),
+                "water_level_m": json_number(round(row["level_m"], 3)),
                 "laser_points": on_target["laser"],
                 "soundings": sum(on_target[head] for head in heads),
                 **({f"soundings_{head}": on_target[head] for head in heads} if len(heads) > 1 else {}),

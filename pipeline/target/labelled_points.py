@@ -1,7 +1,10 @@
 """Points of both sensors labelled by the faces of the target, batch by batch."""
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +24,7 @@ from pipeline.target.sonar_beams import beams_in_target
 from pipeline.target.surface import ClosestSurface
 
 Array = NDArray[np.float64]
+Labelled = tuple[Batch, dict[str, int]]  # rows of the stream of labelled points, and the number of points by reason
 
 
 @dataclass(frozen=True)
@@ -35,6 +39,8 @@ class LabellingContext:
         The pose of the target.
     mount
         Provisional mount of the sensor that is calibrated.
+    levels_m
+        Height (p,) of the water in each pass, target frame.
     trajectory, corrected
         Poses of the body in the target frame, as recorded, and without the drift of the INS as far as it is known.
     laser, laser_beam_m
@@ -51,6 +57,7 @@ class LabellingContext:
     mount: ProvisionalMount
     trajectory: Trajectory
     corrected: Trajectory
+    levels_m: Array
     laser: Mounted
     laser_beam_m: float
     mbes: SonarBeams | None
@@ -88,20 +95,34 @@ def label_batch(source: str, batch: Batch, context: LabellingContext) -> BatchRe
         Rows of the stream of labelled points, and the number of points by reason.
     """
     if source == "laser_pool":
-        return _label_laser(batch, context)
-    if context.mbes is None:
+        stream, label = "laser_labelled", partial(_label_laser, context=context)
+    elif context.mbes is None:
         raise TypeError("soundings without a sonar")
-    return _label_soundings(batch, context, context.mbes)
+    else:
+        stream, label = "soundings_labelled", partial(_label_soundings, context=context, mbes=context.mbes)
+    levels_m = context.levels_m[batch["pass"]]
+    starts = np.flatnonzero(np.diff(levels_m)) + 1  # the water's level is another from there on
+    pieces = [
+        label({name: column[low:high] for name, column in batch.items()}, float(levels_m[low]) if high else 0.0)
+        for low, high in pairwise([0, *starts.tolist(), len(levels_m)])
+    ]
+    if len(pieces) == 1:
+        return BatchResult({stream: pieces[0][0]}, pieces[0][1])
+    columns = {name: np.concatenate([rows[name] for rows, _ in pieces]) for name in pieces[0][0]}
+    counts: Counter[str] = Counter()
+    for _, of_piece in pieces:
+        counts.update(of_piece)
+    return BatchResult({stream: columns}, dict(counts))
 
 
-def _label_laser(batch: Batch, context: LabellingContext) -> BatchResult:
+def _label_laser(batch: Batch, level_m: float, context: LabellingContext) -> Labelled:
     model = context.model
     mount = context.laser if context.mbes is not None else context.provisional_mount
-    settings = laser_limits(context.settings, model.water_level_m, context.target.gate_m, context.laser_beam_m)
+    settings = laser_limits(context.settings, level_m, context.target.gate_m, context.laser_beam_m)
     R_body_from_laser, lever_arm_m = mount.R_body_from_sensor, mount.lever_arm_body_m
     sensor = point_array(batch, "laser_m")
     points = context.corrected.points_from_sensor(batch["t_ns"], sensor, R_body_from_laser, lever_arm_m)
-    dry = points[:, 2] > model.water_level_m + context.settings.water_margin_m / 2
+    dry = points[:, 2] > level_m + context.settings.water_margin_m / 2
     near = np.flatnonzero(near_planes(model, points, settings.gate_m, dry, settings.seen))
     points = points[near]
     rays = TargetBeams.from_origins(context.corrected.track_of_point(batch["t_ns"][near], lever_arm_m), points)
@@ -114,17 +135,16 @@ def _label_laser(batch: Batch, context: LabellingContext) -> BatchResult:
     columns |= xyz_columns("{}_laser_m", [batch[f"{axis}_laser_m"][rows] for axis in "xyz"])
     columns |= xyz_columns("{}_target_m", placed.T)
     columns["cos_incidence"], columns["edge_weight"] = labels.cos_incidence[on], labels.edge_weight[on]
-    counts = _counts("below or near the water line", dry, len(near), "near an edge", labels)
-    return BatchResult({"laser_labelled": columns}, counts)
+    return columns, _counts("below or near the water line", dry, len(near), "near an edge", labels)
 
 
-def _label_soundings(batch: Batch, context: LabellingContext, mbes: SonarBeams) -> BatchResult:
+def _label_soundings(batch: Batch, level_m: float, context: LabellingContext, mbes: SonarBeams) -> Labelled:
     model, mount, trajectory = context.model, context.provisional_mount, context.corrected
     lever_arm_m = mount.lever_arm_body_m
     sensor = point_array(batch, "mbes_m")
     points = trajectory.points_from_sensor(batch["t_ns"], sensor, mount.R_body_from_sensor, lever_arm_m)
-    settings = sonar_limits(context.settings, model.water_level_m, context.mount.gate_m)
-    wet = points[:, 2] < model.water_level_m - context.settings.water_margin_m / 2
+    settings = sonar_limits(context.settings, level_m, context.mount.gate_m)
+    wet = points[:, 2] < level_m - context.settings.water_margin_m / 2
     near = np.flatnonzero(near_planes(model, points, settings.gate_m, wet, settings.seen))
     _, R_target_from_body = trajectory.poses_at(batch["t_ns"][near])
     beams = beams_in_target(R_target_from_body, mount.R_body_from_sensor, sensor[near], mbes)
@@ -140,7 +160,7 @@ def _label_soundings(batch: Batch, context: LabellingContext, mbes: SonarBeams) 
     columns = {name: batch[name][rows] for name in names} | {"face": labels.face[on], "edge_weight": weight}
     counts = _counts("above or near the water line", wet, len(near), "footprint near an edge", labels)
     counts |= {"footprint partly on another face": hidden, "used": len(on)}
-    return BatchResult({"soundings_labelled": columns}, counts)
+    return columns, counts
 
 
 @dataclass(frozen=True)
