@@ -3,6 +3,7 @@
 Each session is simulated with all errors drawn by their sigmas (``tools.drawn_errors``), and calibrated twice: on the
 target that ``kind: found`` finds in the laser's points, and on the drawn one, with the same ``as_built``. Drawn faces
 that no found plane meets are ``seen: dry``, or left out below the water: soundings on them give what no finding can.
+Found planes that are not drawn, such as a wall behind the target, are struck.
 
     python -m tools.found_and_drawn [--only dock ...] [--sessions 20] [--jobs 2] [--resume] > FILE.md
 """
@@ -33,7 +34,7 @@ from tools.session_rows import NAMES, UNITS, error_columns, poolcal
 FOLDER = Path("runs/found-and-drawn")
 SCENARIOS = Path(__file__).parents[1] / "configs" / "scenarios"
 AS_BUILT = AsBuilt(offset_sigma_m=0.02, angle_sigma_deg=0.1, bow_sigma_m=0.005, growth_sigma_m=0.015)
-FOUND = {"target": {"kind": "found", "depth_m": 4.0}}
+FOUND: dict[str, Any] = {"kind": "found", "depth_m": 4.0}
 KINDS = {"dock": "dock.yaml", "caisson": "caisson.yaml", "patent": "drift.yaml", "returns": ""}  # "": of tools.places
 FIRST_SEED = 90_000
 SAME_DEG, SAME_M = 1.0, 0.05  # a drawn face within these of a found plane lies in it
@@ -76,13 +77,14 @@ def row_of(task: Task) -> dict[str, Any]:
         (folder / "scenario.yaml").write_text(yaml.safe_dump(scenario), encoding="utf-8")
         session = folder / "session"
         poolcal(["simulate", session, "--scenario", folder / "scenario.yaml", "--seed", task.seed], (0,))
-        by_finding = _calibrated(folder, "found", FOUND)
-        target = json.loads((folder / "found" / "found.json").read_text("utf-8"))["found"]["target"]
+        poolcal(["target", session, "--depth", FOUND["depth_m"], "--out", folder / "place.yaml"], (0,))
+        target = yaml.safe_load((folder / "place.yaml").read_text("utf-8"))["target"]
         settings = yaml.safe_load((session / "pool.yaml").read_text("utf-8"))["target"]
-        drawn = _same_faces(model, settings, target)
+        drawn, others = _same_faces(model, settings, target)
+        by_finding = _calibrated(folder, "found", {"target": FOUND | {"strike": others}})
         by_drawing = _calibrated(folder, "drawn", {"target": drawn, "as_built": AS_BUILT.model_dump(mode="json")})
         truth = json.loads(Path(f"{session}.truth.json").read_text("utf-8"))
-    row |= {"faces": len(target["faces"]), "drawn_faces": len(drawn["faces"])}
+    row |= {"faces": len(target["faces"]) - len(others), "drawn_faces": len(drawn["faces"])}
     row |= error_columns(by_finding, truth) | error_columns(by_drawing, truth, prefix="drawn_")
     mounts = [(np.array(one["R_body_from_mbes"]), np.array(one["lever_arm_m"])) for one in (by_drawing, by_finding)]
     apart = dict(zip(NAMES, mount_error(*mounts[1], *mounts[0]) / UNITS, strict=True))
@@ -99,12 +101,17 @@ def _calibrated(folder: Path, run: str, config: dict[str, Any]) -> dict[str, Any
     return block
 
 
-def _same_faces(model: TargetModel, settings: dict[str, Any], found: dict[str, Any]) -> dict[str, Any]:
-    """Return the drawn target, of which the sonar sees the faces in found planes; those in one plane are related."""
+def _same_faces(
+    model: TargetModel, settings: dict[str, Any], found: dict[str, Any]
+) -> tuple[dict[str, Any], list[str]]:
+    """Return the drawn target, of which the sonar sees the faces in found planes; those in one plane are related.
+
+    And the names of found planes in which no drawn face lies, such as that of a wall behind the target.
+    """
     theirs, own = frame_of(found), frame_of(settings)
     seen: dict[str, str] = {}
-    relations = []
-    for face in found["faces"].values():
+    relations, others = [], []
+    for name, face in found["faces"].items():
         outline = own.points_from_ecef(theirs.points_to_ecef(np.array(face["corners"])))
         middle = outline.mean(axis=0)
         normal = np.linalg.svd(outline - middle)[2][2]
@@ -115,6 +122,8 @@ def _same_faces(model: TargetModel, settings: dict[str, Any], found: dict[str, A
             and np.abs((one.vertices_m - middle) @ normal).max() < SAME_M
         ]
         seen |= {one.name: one.seen for one in same}
+        if not same:
+            others.append(name)
         if len(same) > 1:
             relations.append({"same_plane": [one.name for one in same]})
     for family in model.families:
@@ -126,7 +135,7 @@ def _same_faces(model: TargetModel, settings: dict[str, Any], found: dict[str, A
     kept = {key: settings[key] for key in ("origin", "azimuth_deg", "water_level_m") if key in settings}
     corners = {one.name: one.vertices_m.tolist() for one in model.faces}
     faces = {name: {"corners": corners[name], "seen": sensors} for name, sensors in seen.items()}
-    return kept | {"kind": "faces", "faces": faces, "relations": relations}
+    return kept | {"kind": "faces", "faces": faces, "relations": relations}, others
 
 
 def page(table: pd.DataFrame) -> str:

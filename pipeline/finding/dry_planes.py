@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pipeline.artefacts.streams import Mapper, serial
 from pipeline.errors import RawDataError
 from pipeline.maths.adjustment.profiles import NORMAL
-from pipeline.maths.surfaces.flatness import Flatness, cells_of, flatness, plane_axes
+from pipeline.maths.surfaces.flatness import Flatness, cells_of, flatness, of_one_surface, plane_axes
 from pipeline.maths.surfaces.growing import GrowthLimits, Plane, grown_regions, plane_of_voxels
 from pipeline.maths.surfaces.outline import area, convex_hull, inside, shrunk, simplified
 from pipeline.maths.surfaces.voxels import voxels_with_rows
@@ -161,18 +161,22 @@ def _plane(all_m: Array, rows: Integers, grown: Plane, boat_m: Array) -> DryPlan
 
 
 def _near_the_edge(points_m: Array, normal: Array, distance_m: float, coarse: Array, above_m: float) -> Array:
-    """Return the outline (k, 2) of small cells above a height; the coarse one if they cover too little of it.
+    """Return the outline (k, 2) of the points of small cells above a height; the coarse one if they are too few.
 
-    Means of the outermost coarse cells lie up to half a cell inside the edge, and voxels at a corner belong to neither
-    wall: together a fifth of a narrow wall's points.
+    Means of the outermost cells lie up to half a cell inside the edge, and voxels at a corner belong to neither wall:
+    together a fifth of a narrow wall's points. So the outline is that of the outermost cells' points themselves.
     """
     if len(coarse) < 3:
         return coarse
-    near = points_m[(np.abs(points_m @ normal - distance_m) <= OFF_M) & (points_m[:, 2] > above_m)]
-    in_plane, low, high = near @ plane_axes(normal).T, coarse.min(axis=0), coarse.max(axis=0)
-    near = near[np.all((in_plane > low - BEYOND_M) & (in_plane < high + BEYOND_M), axis=1)]
-    cells_m, fine = _cells_on(near, normal, distance_m, EDGE_CELL_M, EDGE_MARGIN_M)
-    return fine if len(cells_m) * EDGE_CELL_M**2 >= COVERED * area(coarse) else coarse
+    on = points_m[(np.abs(points_m @ normal - distance_m) <= UNEVEN_M) & (points_m[:, 2] > above_m)]
+    in_plane, low, high = on @ plane_axes(normal).T, coarse.min(axis=0), coarse.max(axis=0)
+    in_plane = in_plane[np.all((in_plane > low - BEYOND_M) & (in_plane < high + BEYOND_M), axis=1)]
+    cells, inverse, count = cells_of(in_plane, EDGE_CELL_M)
+    full, middles_m = count >= FEWEST, np.asarray((cells + 0.5) * EDGE_CELL_M, dtype=np.float64)
+    if full.sum() * EDGE_CELL_M**2 < COVERED * area(coarse):
+        return coarse
+    outermost = full & ~inside(shrunk(convex_hull(middles_m[full]), EDGE_CELL_M), middles_m)
+    return simplified(shrunk(convex_hull(in_plane[outermost[inverse]]), EDGE_MARGIN_M), CORNERS)
 
 
 def _cells_on(
@@ -182,12 +186,15 @@ def _cells_on(
 
     Single points far out make no cell.
     """
-    away = points_m @ normal - distance_m
-    points, axes = points_m[np.abs(away) <= OFF_M], plane_axes(normal)
+    away, axes = points_m @ normal - distance_m, plane_axes(normal)
+    near = np.abs(away) <= OFF_M
+    points, away = points_m[near], away[near]
     _, inverse, count = cells_of(points @ axes.T, cell_m)
-    sums = np.array([np.bincount(inverse, weights=axis, minlength=len(count)) for axis in points.T])
-    means = (sums / count).T[count >= FEWEST]
-    means = means[np.abs(means @ normal - distance_m) <= UNEVEN_M]
+    sums = np.array([np.bincount(inverse, weights=axis, minlength=len(count)) for axis in (*points.T, away, away**2)])
+    full = count >= FEWEST
+    of_cells = (sums[:, full] / count[full]).T
+    means, off, squares = of_cells[:, :3], of_cells[:, 3], of_cells[:, 4]
+    means = means[(np.abs(off) <= UNEVEN_M) & of_one_surface(off, squares)]
     return means, simplified(shrunk(convex_hull(means @ axes.T), margin_m), CORNERS)
 
 

@@ -74,7 +74,7 @@ def turns_deg(session: SimulatedSession, place: FoundPlace) -> list[float]:
     angles = []
     for mine, true in zip(model.faces, [truth.faces[1], truth.faces[0], truth.faces[2]], strict=True):
         tip, foot = true_frame.points_from_ecef(frame.points_to_ecef(np.array([mine.normal, np.zeros(3)])))
-        angles.append(float(np.degrees(np.arccos((tip - foot) @ true.normal))))
+        angles.append(float(np.degrees(np.arccos(np.clip((tip - foot) @ true.normal, -1.0, 1.0)))))
     return angles
 
 

@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 FEWEST = 4  # points of a cell that counts
 FEWEST_CELLS = 8  # cells for a surface of second order
+THICK, THIN_M = 2.5, 0.01  # a cell sees two surfaces if its points scatter by more, in quartiles of the cells, and m
 COUNTED = 1_000_000  # cells, with points or without, that are counted however few the points are
 
 
@@ -104,6 +105,18 @@ def flatness(in_plane_m: Array, away_m: Array, cell_m: float) -> Flatness:
         bow_m=_bow(place, mean) if len(mean) >= FEWEST_CELLS and np.all(spans > 2) else 0.0,
         covered=float(use.sum() / np.prod(spans)),
     )
+
+
+def of_one_surface(mean_m: Array, squares_m2: Array) -> NDArray[np.bool_]:
+    """Return whether cells (c,) see one surface, by the means of their points' distances and of the squares of these.
+
+    The edge of a ledge behind the plane makes the points of a cell scatter far more than those of most.
+
+    >>> of_one_surface(np.zeros(4), np.array([0.005, 0.006, 0.007, 0.040]) ** 2).tolist()
+    [True, True, True, False]
+    """
+    scatter = np.sqrt(np.maximum(squares_m2 - mean_m**2, 0.0))
+    return scatter <= max(THICK * float(np.quantile(scatter, 0.25)), THIN_M) if len(scatter) else scatter < 0
 
 
 def _design(place: Array) -> Array:
