@@ -37,13 +37,13 @@ from pipeline.report.laser_report import laser_report
 from pipeline.report.method_blocks import calibration_table
 from pipeline.report.noise_warnings import correlated_beams, sigmas_too_small, uneven_noise
 from pipeline.report.part_checks import parts_block
-from pipeline.report.reason_codes import verdict_in_words
+from pipeline.report.reason_codes import Statement, verdict_in_words
 from pipeline.report.sensor_report import SensorReport
 from pipeline.report.sigma_sources import laser_correlates
 from pipeline.report.sonar_report import SonarSettings, sonar_report
 from pipeline.report.suspected_causes import errors_allowed_for
 from pipeline.report.systematic_errors import systematic_block
-from pipeline.report.verdict import Criteria, explanations, rejections
+from pipeline.report.verdict import Criteria, explanations, has_values, rejections
 from pipeline.report.wall_checks import left_out_block, unsurveyed_walls
 from pipeline.report.warnings import geometry_gaps, target_found, target_off_origin, unexpected_noise
 from pipeline.target.design import target_of
@@ -114,13 +114,8 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     warnings = [
         *geometry_gaps(inputs.geometry, report.methods["adjustment"]["sigma_mount_total"]),
         *unsettled_labels(float(inputs.provisional_mount["label_change"].iloc[0])),
-        *unexpected_noise(inputs.groups),
-        *uneven_noise(inputs.groups),
-        *correlated_beams(inputs.groups),
-        *sigmas_too_small(first.estimate, config.adjust.test_level),
-        *errors_allowed_for(inputs.freed, config.adjust.test_level),
-        *target_off_origin(target), *target_found(model), *unsurveyed_walls(first, config.limits),
-        *(check for check in (drift_check, off_figures) if check is not None and check not in (NO_DRIFT, *reasons)),
+        *([] if model.found else target_off_origin(target)), *target_found(model),
+        *(_of_values(first, config, (drift_check, off_figures), reasons) if has_values(inputs.summary) else ()),
         *report.pass_warnings,
         *deviations_from_design(shape, design_shape(model), shape_errors(inputs.planes, model)),
         *report.cast_warnings,
@@ -156,6 +151,22 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     }
     json_text, yaml_text = documents(result)
     return Outputs(calibration_json=json_text, calibration_yaml=yaml_text, **_tables(report, further))
+
+
+def _of_values(
+    evidence: Evidence, config: Config, of_drift: Sequence[Statement | None], reasons: Sequence[Statement]
+) -> list[Statement]:
+    """Return the warnings that rest on the adjusted values; ``of_drift``: of the INS's drift, where it is no reason."""
+    level = config.adjust.test_level
+    return [
+        *unexpected_noise(evidence.groups),
+        *uneven_noise(evidence.groups),
+        *correlated_beams(evidence.groups),
+        *sigmas_too_small(evidence.estimate, level),
+        *errors_allowed_for(evidence.freed, level),
+        *unsurveyed_walls(evidence, config.limits),
+        *(check for check in of_drift if check is not None and check not in (NO_DRIFT, *reasons)),
+    ]
 
 
 def _tables(report: SensorReport, further: Sequence[HeadReport]) -> dict[str, Any]:

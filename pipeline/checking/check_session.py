@@ -18,6 +18,7 @@ from pipeline.checking.point_samples import rows_with_pose, sample_points, sampl
 from pipeline.checking.track import InsTrack, Leg, frame_of, joined, sees_port, track_of
 from pipeline.checking.trial_calibration import Calibrate, TrialCalibration
 from pipeline.checking.trial_findings import pose_findings, sign_findings
+from pipeline.checking.water_checks import water_findings
 from pipeline.config.pool import Ingest, PoolConfig
 from pipeline.config.session import SessionConfig
 from pipeline.gps_time import NS
@@ -129,17 +130,13 @@ def _check_at_target(session: _Session, epochs: dict[str, Times], unusable: set[
         words = "target.azimuth_deg is not given, and the boat never has target.origin within 20 m abeam"
         return replace(away, findings=(Finding("side", f"{words}; give azimuth_deg, or check target.origin"),))
     track = track_of(ins, frame, model, files, pool.ingest, sees_port(session.settings))
-    findings = [
-        *track_checks.sailing_findings(track, pool.target_place),
-    ]
-    if pool.target.water_level_changes is None:
-        findings += track_checks.water_findings(track.legs, pool.segment.water_margin_m)
+    findings = list(track_checks.sailing_findings(track, pool.target_place))
     usable = [sensor for sensor in ("laser", "mbes") if sensor in epochs and sensor not in unusable]
     of_points: list[Finding] = []
     counts = None
     if all(finding.severity == "look" for finding in findings):
         of_points, counts = _point_findings(session, track, usable)
-    findings += of_points
+    findings += [*of_points, *water_findings(track.legs, pool)]
     if not unusable and not any(finding.question == "clock" for finding in of_points):
         findings += track_checks.missing_pass_findings(track, files)
         coarseness_ns = max(file.coarseness_ns for file in files if file.sensor == "ins")

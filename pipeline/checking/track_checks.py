@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from pipeline.checking.file_survey import Columns, SurveyedFile
 from pipeline.checking.findings import Finding
-from pipeline.checking.track import InsTrack, Leg, askew_deg
+from pipeline.checking.track import InsTrack, askew_deg
 from pipeline.config.pool import PoolConfig, TargetPlace
 from pipeline.config.target import Origin
 from pipeline.console import plural
@@ -111,34 +111,6 @@ def sailing_findings(track: InsTrack, place: TargetPlace) -> Iterator[Finding]:
             "distances",
             f"all passes are {np.mean(distances):.1f} m from the wall (within {np.ptp(distances):.1f} m): only "
             "different distances separate yaw from lever arm y; sail some more passes, 2 m nearer or farther",
-            "look",
-        )
-
-
-def water_findings(legs: Sequence[Leg], margin_m: float) -> Iterator[Finding]:
-    """Yield a finding if the boat lies higher in one good pass than in another: the water has risen, or fallen.
-
-    A floating boat rises with the tide, and in a lock. Near the water's line points would be taken for the other
-    medium's.
-
-    Parameters
-    ----------
-    legs : Sequence[Leg]
-        The passes.
-    margin_m : float
-        No point nearer to the configured water level than this is used (segment.water_margin_m).
-    """
-    good = [leg for leg in legs if leg.good]
-    if not good:
-        return
-    low, high = (choose(good, key=lambda leg: leg.height_m) for choose in (min, max))
-    rise_m = high.height_m - low.height_m
-    if rise_m > margin_m:
-        yield Finding(
-            "water",
-            f"the boat lies {rise_m:.2f} m higher in the pass of {utc_text(high.start_ns)} than in that of "
-            f"{utc_text(low.start_ns)}: the water rose or fell, or the INS's height wandered. If "
-            "the heights are sure (RTK fixed), write target.water_level_changes: ins, or name a file of readings there",
             "look",
         )
 

@@ -7,6 +7,8 @@ from pipeline.finding.dry_planes import DryPlane
 from pipeline.finding.place import FoundPlace
 from pipeline.text_table import text_table
 
+ENOUGH = 4  # faces, of which the others show the one that is wrong
+
 
 def table_text(place: FoundPlace) -> str:
     """Return the planes that were found, those that serve first, and the place, for the screen."""
@@ -22,8 +24,18 @@ def table_text(place: FoundPlace) -> str:
             "",
             f"Origin: latitude {place.latitude_deg:.9f}, longitude {place.longitude_deg:.9f}, height "
             f"{place.height_m:.3f}; azimuth {place.azimuth_deg:.3f}°; the water is at {place.water_level_m:.3f} m.",
+            *_too_few(len(place.faces)),
         ]
     )
+
+
+def _too_few(faces: int) -> list[str]:
+    if faces >= ENOUGH:
+        return []
+    return [
+        f"With {plural(faces, 'face')} nobody can tell which is wrong if one does not go on below the water as above: "
+        f"pass {ENOUGH} or more."
+    ]
 
 
 def serving_first(place: FoundPlace) -> list[DryPlane]:

@@ -6,6 +6,8 @@ readings, or of the INS's height: the boat floats. Of a target that was found ``
 points end, the lowest level of all; of another it is the mean over the passes.
 """
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,26 +32,41 @@ def water_levels(target: Target, context: PoolContext) -> Array:
     if changes is None or not count:
         return np.full(count, target.water_level_m)
     t_ns = context.trajectory.t_ns
-    by_ins = context.trajectory.positions_m[:, 2]
-    heights_m = by_ins if isinstance(changes, str) else _interpolated(changes, context)
+    if isinstance(changes, str):
+        heights_m = context.trajectory.positions_m[:, 2]
+    else:
+        passes = zip(context.starts_ns.tolist(), context.ends_ns.tolist(), strict=True)
+        if words := uncovered(changes, passes):
+            raise RawDataError(words)
+        heights_m = readings_at(changes, t_ns)
     first, last = np.searchsorted(t_ns, context.starts_ns), np.searchsorted(t_ns, context.ends_ns, side="right")
     means = np.array([heights_m[low:high].mean() for low, high in zip(first.tolist(), last.tolist(), strict=True)])
     found = target.kind == "faces" and target.found
     return np.asarray(target.water_level_m + means - (means.min() if found else means.mean()))
 
 
-def _interpolated(readings: Readings, context: PoolContext) -> Array:
-    """Return the heights (n,) m at the times of the INS's records."""
+def read_ns(readings: Readings) -> NDArray[np.int64]:
+    """Return the times (r,) of readings, GPS ns."""
     times = [utc_of(time) for time, _ in readings]
     whole_s = np.array([int(time.timestamp()) for time in times])
-    read_ns = gps_ns_from_unix_utc(whole_s, np.array([1000 * time.microsecond for time in times]))
-    first_ns, last_ns = int(read_ns[0]), int(read_ns[-1])
-    for start_ns, end_ns in zip(context.starts_ns.tolist(), context.ends_ns.tolist(), strict=True):
+    return gps_ns_from_unix_utc(whole_s, np.array([1000 * time.microsecond for time in times]))
+
+
+def readings_at(readings: Readings, t_ns: NDArray[np.int64]) -> Array:
+    """Return the heights (n,) m at these times, between the readings."""
+    times_ns = read_ns(readings)
+    heights_m = np.array([height_m for _, height_m in readings])
+    return np.asarray(np.interp((t_ns - times_ns[0]) / NS, (times_ns - times_ns[0]) / NS, heights_m))
+
+
+def uncovered(readings: Readings, passes: Iterable[tuple[int, int]]) -> str:
+    """Return in words the first of these passes, by its first and last time, that the readings do not cover; or ""."""
+    first_ns, last_ns = (int(time) for time in read_ns(readings)[[0, -1]])
+    for start_ns, end_ns in passes:
         if not first_ns <= start_ns <= end_ns <= last_ns:
-            raise RawDataError(
+            return (
                 f"target.water_level_changes: the readings, from {utc_text(first_ns)} to {utc_text(last_ns)}, do not "
                 f"cover the pass from {utc_text(start_ns)} to {utc_text(end_ns)}; add readings, or write: "
                 f"water_level_changes: {BY_INS}"
             )
-    heights_m = np.array([height_m for _, height_m in readings])
-    return np.asarray(np.interp((context.trajectory.t_ns - first_ns) / NS, (read_ns - first_ns) / NS, heights_m))
+    return ""

@@ -53,8 +53,9 @@ REMEDIES: dict[Code, Remedy] = {
         "passes. Where the target's pose is ambiguous, correct that first.",
     ),
     Code.NOT_CONVERGED: Remedy(
-        "Mostly a wrong target, or a coarse mount beyond its limits.",
-        "Check the pool's config; then look at the tables of segment.",
+        "Mostly a wrong target, or a coarse mount beyond its limits; at a wall, a plane that is off below the water.",
+        "Check the pool's config. At a wall, strike the plane that the other reasons name, or one after the other, and "
+        "run again; or make target.depth_m smaller by half a metre. Do not look at the residuals.",
     ),
     Code.TOO_FEW_SOUNDINGS: Remedy(
         "Fewer than 30 soundings lie on a family of faces.",

@@ -119,7 +119,8 @@ def rejections(
 ) -> list[Statement]:
     """Return the reasons for which the calibration is rejected; empty if it is accepted.
 
-    If the labels are in doubt, or the adjustment has no result, nothing else is judged.
+    If the labels are in doubt, or the adjustment has no result, nothing else is judged; if it did not converge, nothing
+    that rests on its values.
 
     Parameters
     ----------
@@ -138,17 +139,17 @@ def rejections(
     if summary["reason"]:
         words = "; ".join([summary["reason"], *evidence.geometry["words"]])
         return [Statement(ReasonCode.NO_RESULT, f"the adjustment has no result: {words}")]
-    reasons = []
-    if not summary["converged"]:
-        words = f"the adjustment did not converge in {summary['iterations']} steps"
-        reasons.append(Statement(ReasonCode.NOT_CONVERGED, words))
-    reasons += ambiguous_minimum(summary)
+    reasons = ambiguous_minimum(summary)
     gates_m = {"laser": evidence.target_pose["gate_m"].iloc[0]}
     for head in heads:
         gates_m[head.name or "mbes"] = head.evidence.provisional_mount["gate_m"].iloc[0]
         reasons += named(head.name, too_few_soundings(evidence.cells, head.name or "mbes"))
     reasons += faces_in_doubt(evidence.left_out)
     reasons += [one for head in heads for one in named(head.name, _far_from_coarse(head))]
+    if not summary["converged"]:
+        steps = summary["iterations"]
+        words = f"the adjustment did not converge in {steps} steps: its values and residuals say nothing"
+        return [*reasons, Statement(ReasonCode.NOT_CONVERGED, words)]
     reasons += _residual_reasons(evidence, criteria, drift_check)
     reasons += noise_cut_by_gate(evidence.cells, gates_m)  # a face that is off scatters too, and is named before
     reasons += disagreeing_parts(evidence.parts, criteria.test_level)
@@ -204,9 +205,14 @@ def _doubts(evidence: Evidence, criteria: Criteria) -> list[Statement]:
     )
 
 
+def has_values(summary: pd.DataFrame) -> bool:
+    """Return whether the adjustment has values that can be judged (table ``summary``): a result, and it converged."""
+    return not summary["reason"].iloc[0] and bool(summary["converged"].iloc[0])
+
+
 def explanations(evidence: Evidence, criteria: Criteria) -> list[Hypothesis]:
     """Return what would explain the residuals, the strongest explanation first; empty if they need none."""
-    if _doubts(evidence, criteria) or evidence.summary["reason"].iloc[0]:
+    if _doubts(evidence, criteria) or not has_values(evidence.summary):
         return []
     parts = deviating_parts(_residual_tests(evidence, criteria), evidence.parts, criteria.test_level)
     return hypotheses(parts, suspected_causes(evidence.freed, evidence.sets, criteria.test_level))

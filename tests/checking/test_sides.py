@@ -1,4 +1,4 @@
-"""On which side of the boat the target may lie, passes on both sides, and water that rises between passes."""
+"""On which side of the boat the target may lie, and passes on both sides."""
 
 from pathlib import Path
 from typing import Any
@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.checking.track import Leg, sees_port
-from pipeline.checking.track_checks import water_findings
+from pipeline.checking.track import sees_port
 from pipeline.config.session import SessionConfig
 from pipeline.config.yaml_models import parse
 from tests.support.places import edit, poolcal, simulate
@@ -48,20 +47,3 @@ def test_a_pass_back_without_soundings_is_missed_if_the_boat_sounds_on_the_way_b
     back |= (t >= passes.loc[3, "start_ns"]) & (t <= passes.loc[3, "end_ns"])
     only_along = calibrated(session, "ingest", raw={"mbes": {k: v[~back] for k, v in session.mbes.items()}})
     assert only_along["ingest/unsounded_passes"].empty  # it came back with the sonar off, as one does
-
-
-@pytest.mark.parametrize(("rise_m", "found"), [(0.09, False), (0.12, True), (-0.30, True)])
-def test_water_that_rises_between_passes_is_told(rise_m: float, found: bool) -> None:
-    ran = {"laser": 1.0, "mbes": 1.0}
-    legs = [
-        Leg(k * 10**11, k * 10**11 + 10**10, away_m, 0.4, 1.0, height_m, True, ran)
-        for k, (away_m, height_m) in enumerate([(4.0, 1.3), (7.0, 1.3 + rise_m), (-5.0, 9.0)])  # the last one: behind
-    ]
-    findings = list(water_findings(legs, 0.10))
-    assert len(findings) == found
-    for finding in findings:
-        assert (finding.question, finding.severity) == ("water", "look")
-        higher, lower = ("1980-01-06T00:01:40Z", "1980-01-06T00:00:00Z")[:: 1 if rise_m > 0 else -1]
-        assert f"{abs(rise_m):.2f} m higher in the pass of {higher} than in that of {lower}" in finding.words
-        assert "write target.water_level_changes: ins, or name" in finding.words
-    assert list(water_findings([], 0.10)) == []

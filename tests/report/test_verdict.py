@@ -253,3 +253,9 @@ def test_a_mount_is_far_from_the_coarse_one_beyond_the_search_by_three_sigmas(pl
             value = np.zeros(6)
             value[place] = sign * (limit + times * sigma)
             assert codes(judged(evidence(value=value.tolist()))) == expected
+
+
+def test_of_an_adjustment_that_did_not_converge_no_value_is_judged():
+    strict = replace(ADJUSTED, limits=VerdictLimits(max_sigma_deg=1e-6))
+    diverged = evidence(summary={"converged": False}, patterns=[PASS_3], left_out=[{"why": "doubt"}], rms_m=0.06)
+    assert codes(judged(diverged, strict)) == [ReasonCode.FACES_IN_DOUBT, ReasonCode.NOT_CONVERGED]
