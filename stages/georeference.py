@@ -20,21 +20,22 @@ from pipeline.artefacts.catalogue.points import (
     SOUNDINGS,
     SOUNDINGS_POOL,
     TRAJECTORY,
-    WATER_LEVELS,
 )
 from pipeline.artefacts.counts import by_reason, counts_table, why_none_used
 from pipeline.artefacts.streams import EMPTY_STREAM, BatchResult, Chunk, Stream, point_array
 from pipeline.artefacts.to_tables import poses_table, xyz_columns
+from pipeline.artefacts.water_levels import uncovered, water_levels
 from pipeline.config.pool import Georeference
 from pipeline.config.stage_settings import LaserPlacement, SonarPlacement
 from pipeline.config.target import Target
 from pipeline.errors import RawDataError
 from pipeline.georeference.placement import laser_in_pool, soundings_in_pool
 from pipeline.georeference.pool_context import PoolContext
-from pipeline.georeference.water_levels import water_levels
 from pipeline.gps_time import NS
 from pipeline.maths.geometry.passes import pass_of
 from pipeline.target.design import target_of
+
+FARTHEST_M = 30.0  # of a pass from the target: in one farther off no point of it is used
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,6 @@ class Outputs:
     """Tables and streams that the stage writes."""
 
     poses: Annotated[pd.DataFrame, POSES]
-    water_levels: Annotated[pd.DataFrame, WATER_LEVELS]
     counts: Annotated[pd.DataFrame, GEOREFERENCE_COUNTS]
     laser_pool: Annotated[Stream, LASER_POOL] = EMPTY_STREAM
     soundings_pool: Annotated[Stream, SOUNDINGS_POOL] = EMPTY_STREAM
@@ -71,18 +71,30 @@ class Outputs:
 
 @dataclass(frozen=True)
 class Prepared:
-    """The poses of the INS in the pool frame, with the passes and the box round the target; the water by pass."""
+    """The poses of the INS in the pool frame, with the passes and the box; heights (p,) of the water in each pass."""
 
     context: PoolContext
     levels_m: NDArray[np.float64]
 
 
 def prepare(inputs: Inputs, config: Config) -> Prepared:
-    """Return the poses of the INS in the pool frame, with the passes and the box round the target."""
+    """Return the poses of the INS in the pool frame, with the passes and the box round the target.
+
+    Raises
+    ------
+    RawDataError
+        Readings of the water do not cover a pass at the target.
+    """
     low, high = target_of(config.target).bounds()
     margin = config.georeference.box_margin_m
     context = PoolContext.of(inputs.trajectory, inputs.passes, inputs.pool_frame, (low - margin, high + margin))
-    return Prepared(context, water_levels(config.target, context))
+    by_time = config.target.water_by_time
+    if by_time is not None and by_time.readings is not None:
+        near = inputs.passes[inputs.passes["distance_m"].abs() <= FARTHEST_M]
+        if words := uncovered(by_time.readings, near["start_ns"].tolist(), near["end_ns"].tolist()):
+            raise RawDataError(words)
+    levels_m, _ = water_levels(config.target, context.trajectory, context.starts_ns, context.ends_ns)
+    return Prepared(context, levels_m)
 
 
 def run_batch(source: str, chunk: Chunk, prepared: Prepared, config: Config) -> BatchResult:
@@ -143,5 +155,4 @@ def combine(prepared: Prepared, partials: dict[str, list[tuple[str, dict[str, in
                 f"check target.origin, target.azimuth_deg and {placing}: poolcal check tells which sign, clock or "
                 "height would bring points there"
             )
-    levels = pd.DataFrame({"pass": np.arange(len(prepared.levels_m)), "level_m": prepared.levels_m})
-    return Outputs(poses=poses_table(prepared.context.trajectory), water_levels=levels, counts=counts)
+    return Outputs(poses=poses_table(prepared.context.trajectory), counts=counts)

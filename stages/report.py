@@ -8,8 +8,8 @@ import pandas as pd
 
 from pipeline.adjustment.error_sources import stated_of
 from pipeline.adjustment.ins_drift import drift_model, sigmas_from_files
-from pipeline.artefacts.catalogue.points import WATER_LEVELS
 from pipeline.artefacts.catalogue.results import CALIBRATION, CALIBRATION_JSON, CALIBRATION_YAML, CLOSING
+from pipeline.artefacts.catalogue.target import WATER_LEVELS
 from pipeline.artefacts.schema import Provenance
 from pipeline.config.pool import Adjust, AsBuilt, LaserFit, Method, Segment
 from pipeline.config.session import Calibrated, Ins, Laser, Mbes
@@ -46,6 +46,7 @@ from pipeline.report.systematic_errors import systematic_block
 from pipeline.report.verdict import Criteria, explanations, has_values, rejections
 from pipeline.report.wall_checks import left_out_block, unsurveyed_walls
 from pipeline.report.warnings import geometry_gaps, target_found, target_off_origin, unexpected_noise
+from pipeline.report.water_check import water_contradicted
 from pipeline.target.design import target_of
 
 
@@ -115,6 +116,7 @@ def run(inputs: Inputs, config: Config) -> Outputs:
         *geometry_gaps(inputs.geometry, report.methods["adjustment"]["sigma_mount_total"]),
         *unsettled_labels(float(inputs.provisional_mount["label_change"].iloc[0])),
         *([] if model.found else target_off_origin(target)), *target_found(model),
+        *water_contradicted(inputs.water_levels, inputs.cells, config.target, config.segment.water_margin_m),
         *(_of_values(first, config, (drift_check, off_figures), reasons) if has_values(inputs.summary) else ()),
         *report.pass_warnings,
         *deviations_from_design(shape, design_shape(model), shape_errors(inputs.planes, model)),

@@ -23,7 +23,6 @@ from pipeline.artefacts.catalogue.points import (
     POOL_FRAME,
     POSES,
     SOUNDINGS_POOL,
-    WATER_LEVELS,
 )
 from pipeline.artefacts.catalogue.target import (
     FACES,
@@ -32,6 +31,7 @@ from pipeline.artefacts.catalogue.target import (
     SEGMENT_COUNTS,
     SOUNDINGS_LABELLED,
     TARGET_POSE,
+    WATER_LEVELS,
 )
 from pipeline.artefacts.counts import counts_table, used, why_none_used
 from pipeline.artefacts.from_tables import trajectory_in_pool
@@ -58,7 +58,7 @@ from pipeline.target.labelled_points import LabellingContext, label_batch
 from pipeline.target.laser_search import refine_target_and_laser
 from pipeline.target.mount_search import search_mount
 from pipeline.target.pose_search import search_target_pose
-from pipeline.target.result_tables import provisional_mount_table, target_pose_table
+from pipeline.target.result_tables import provisional_mount_table, target_pose_table, water_table
 from pipeline.target.samples import laser_poses, laser_sample, scan_of, sounding_sample
 from pipeline.target.surface import ClosestSurface
 
@@ -89,7 +89,6 @@ class Inputs:
     ins_sigmas: Annotated[pd.DataFrame, INS_SIGMAS]
     pool_frame: Annotated[pd.DataFrame, POOL_FRAME]
     poses: Annotated[pd.DataFrame, POSES]
-    water_levels: Annotated[pd.DataFrame, WATER_LEVELS]
     counts: Annotated[pd.DataFrame, GEOREFERENCE_COUNTS]
     laser_pool: Annotated[Stream, LASER_POOL]
     soundings_pool: Annotated[Stream, SOUNDINGS_POOL]
@@ -101,6 +100,7 @@ class Outputs:
 
     faces: Annotated[pd.DataFrame, FACES]
     target_pose: Annotated[pd.DataFrame, TARGET_POSE]
+    water_levels: Annotated[pd.DataFrame, WATER_LEVELS]
     provisional_mount: Annotated[pd.DataFrame, PROVISIONAL_MOUNT]
     counts: Annotated[pd.DataFrame, SEGMENT_COUNTS]
     laser_labelled: Annotated[Stream, LASER_LABELLED] = EMPTY_STREAM
@@ -152,7 +152,7 @@ def search(inputs: Inputs, config: Config) -> LabellingContext:
         mount=mount,
         trajectory=trajectory,
         corrected=trajectory,
-        levels_m=inputs.water_levels["level_m"].to_numpy(),
+        water=water_table(config.target, trajectory, inputs.passes),
         laser=laser,
         laser_beam_m=config.laser.beam_m,
         mbes=config.mbes,
@@ -215,6 +215,7 @@ def combine(
     return Outputs(
         faces=faces_table(prepared.model),
         target_pose=target_pose_table(prepared.target),
+        water_levels=prepared.water,
         provisional_mount=provisional_mount_table(prepared.mount),
         counts=counts,
     )

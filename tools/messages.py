@@ -22,7 +22,8 @@ LANGUAGE = ROOT / "pipeline" / "language"
 TEMPLATES = ROOT / "pipeline" / "results" / "pages"
 PLACES = (  # where texts for people are made
     "pipeline/adjustment", "pipeline/artefacts/count_codes.py", "pipeline/artefacts/parquet.py",
-    "pipeline/artefacts/patent_tables.py", "pipeline/artefacts/streams.py", "pipeline/atomic_files.py",
+    "pipeline/artefacts/patent_tables.py", "pipeline/artefacts/streams.py", "pipeline/artefacts/water_levels.py",
+    "pipeline/atomic_files.py",
     "pipeline/checking", "pipeline/coarse", "pipeline/config", "pipeline/console.py", "pipeline/entry_check",
     "pipeline/exports", "pipeline/finding/bottom.py", "pipeline/finding/dry_planes.py",
     "pipeline/finding/found_text.py", "pipeline/finding/kept_points.py", "pipeline/finding/place.py", "pipeline/fleet",

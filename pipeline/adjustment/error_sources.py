@@ -135,7 +135,7 @@ def stated_of(laser: Laser, mbes: Mbes, target: Target, as_built: AsBuilt) -> di
         "laser": _device(laser),
         "sonar": _device(mbes),
         "target": {
-            "target": target.model_dump(mode="json", exclude={"azimuth_deg", "water_level_m", "water_level_changes"}),
+            "target": target.model_dump(mode="json", exclude={"azimuth_deg", "water_level_m", "water_by_time"}),
             "as_built": as_built.model_dump(mode="json"),
         },
     }

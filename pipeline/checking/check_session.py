@@ -146,6 +146,11 @@ def _check_at_target(session: _Session, epochs: dict[str, Times], unusable: set[
     return SessionCheck(tuple(files), track.legs, tuple(findings), model, counts)
 
 
+def _still_water(pool: PoolConfig) -> PoolConfig:
+    """Return the settings without the water's level by time: readings that do not serve would end the trial."""
+    return pool.model_copy(update={"target": pool.target.model_copy(update={"water_by_time": None})})
+
+
 def _point_findings(
     session: _Session, track: InsTrack, sensors: Sequence[str]
 ) -> tuple[list[Finding], SoundingCounts | None]:
@@ -163,7 +168,7 @@ def _point_findings(
     fine = fine.with_pose(track)
     raw = {sensor: rows_with_pose(sampled_rows(files, sensor, SAMPLED), track) for sensor in ("laser", "mbes")}
     raw["ins"] = joined(files)
-    trial = session.calibrate(settings, pool, raw) if "laser" in sensors else TrialCalibration()
+    trial = session.calibrate(settings, _still_water(pool), raw) if "laser" in sensors else TrialCalibration()
     findings = list(_trial_findings(session, track, trial))
     if any(finding.severity == "fault" for finding in findings):
         return findings, None

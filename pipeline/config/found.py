@@ -12,7 +12,7 @@ from pydantic import Field
 
 from pipeline.config.quantities import Model
 from pipeline.config.target import FaceName, Masks
-from pipeline.config.water_level import WaterLevelChanges
+from pipeline.config.water_by_time import WaterByTime
 from pipeline.config.yaml_models import parse
 from pipeline.errors import ConfigError
 
@@ -27,7 +27,7 @@ class Found(Model):
     depth_m: Annotated[float, Field(ge=DEPTHS_M[0], le=DEPTHS_M[1])] = DEPTH_M
     strike: tuple[FaceName, ...] = ()  # faces that are no wall below the water
     masks: dict[FaceName, Masks] = Field(default_factory=dict)  # parts of faces that do not count
-    water_level_changes: WaterLevelChanges | None = None  # null: the level stays
+    water_by_time: WaterByTime | None = None  # null: the level stays
 
 
 class _OfPool(Model):
@@ -56,6 +56,11 @@ def with_found(content: dict[str, Any], path: Path, find: Find | None) -> dict[s
     if not isinstance(target, dict) or target.get("kind") != "found":
         return content
     wanted = parse(_OfPool, {"target": target}, str(path)).target
+    if wanted.water_by_time is not None and wanted.water_by_time.readings is not None:
+        raise ConfigError(
+            f"{path}: target.water_by_time.readings: what is found does not say how high the water stood at the first "
+            "reading; give ins_above_water_m, or the file that poolcal target --out writes, with water_level_m"
+        )
     if find is None:
         raise ConfigError(
             f"{path}: target.kind: found: there are no laser points here to find it in; run poolcal target on a "
@@ -73,5 +78,5 @@ def with_found(content: dict[str, Any], path: Path, find: Find | None) -> dict[s
         raise ConfigError(f"{path}: target.strike: no face is left of {', '.join(faces)}; leave one, or more")
     built = content.get("as_built")
     as_built = found["as_built"] | built if isinstance(built, dict) else built or found["as_built"]
-    of_water = {key: target[key] for key in ("water_level_changes",) if key in target}
+    of_water = {key: target[key] for key in ("water_by_time",) if key in target}
     return content | {"target": {**found["target"], "faces": left, **of_water}, "as_built": as_built}

@@ -13,7 +13,7 @@ from pipeline.config.instruments import dotted_keys, merge_presets
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import SessionConfig
 from pipeline.config.target_mesh import with_mesh
-from pipeline.config.water_level import with_water_levels
+from pipeline.config.water_by_time import with_readings
 from pipeline.config.yaml_file import SESSION_YAML, YamlFile
 from pipeline.config.yaml_models import parse
 from pipeline.errors import ConfigError
@@ -33,7 +33,7 @@ def pool_in(file: YamlFile, find: Find | None = None) -> PoolConfig:
             f"{file.path}: is a session's file; --config wants the pool's, which says where the target is"
         )
     refuse_unfilled([file])
-    content = with_water_levels(with_mesh(file.content, file.path), file.path)
+    content = with_readings(with_mesh(file.content, file.path), file.path)
     content = with_found(content, file.path, find)
     return parse(PoolConfig, content, str(file.path))
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
 from pipeline.config.quantities import Angle, Length, Lever, Model
-from pipeline.config.water_level import WaterLevelChanges
+from pipeline.config.water_by_time import WaterByTime
 
 
 def _name(text: str) -> str:
@@ -57,7 +57,7 @@ class Letters(Model):
     origin: Origin
     azimuth_deg: Angle | None = None
     water_level_m: Lever = 0.0
-    water_level_changes: WaterLevelChanges | None = None  # null: the level stays
+    water_by_time: WaterByTime | None = None  # null: the level stays
 
     @model_validator(mode="after")
     def _blocks_fit(self) -> "Letters":
@@ -145,7 +145,7 @@ class Faces(Model):
     origin: Origin
     azimuth_deg: Angle | None = None
     water_level_m: Lever = 0.0
-    water_level_changes: WaterLevelChanges | None = None  # null: the level stays
+    water_by_time: WaterByTime | None = None  # null: the level stays
 
     @property
     def shape(self) -> str:

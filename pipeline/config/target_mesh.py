@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.atomic_files import read_regular
+from pipeline.config.beside import content_beside
 from pipeline.errors import ConfigError
 
 Array = NDArray[np.float64]
@@ -36,11 +36,11 @@ def with_mesh(content: dict[str, Any], path: Path) -> dict[str, Any]:
         return content
     mesh, given = target["mesh"], target.get("faces") or {}
     where = f"{path}: target.mesh = {mesh!r}"
-    if not isinstance(mesh, str) or Path(mesh).is_absolute() or ".." in Path(mesh).parts or set(mesh) & {"\\", "\0"}:
+    if not isinstance(mesh, str):
         raise ConfigError(f"{where}: must name a file beside this one, or in a folder beside it")
     if not isinstance(given, dict) or not all(isinstance(value, dict) for value in given.values()):
         raise ConfigError(f"{path}: target.faces: must be a mapping of each face's name to its settings; correct it")
-    found = dict(_outlines(path.parent / mesh, where))
+    found = dict(_outlines(path, mesh, where))
     unknown = [key for key, value in given.items() if "corners" not in value and key not in found]
     if unknown:
         groups = ", ".join(list(found)[:20])
@@ -56,18 +56,14 @@ def with_mesh(content: dict[str, Any], path: Path) -> dict[str, Any]:
 Groups = Mapping[str, tuple[Array, Sequence[Polygon]]]
 
 
-def _outlines(path: Path, where: str) -> Iterator[tuple[str, Array]]:
+def _outlines(path: Path, mesh: str, where: str) -> Iterator[tuple[str, Array]]:
     """Yield the name of each group, and the corners (k, 3) of its outline in the polygons' sense of rotation."""
-    read = {".obj": _obj, ".ply": _ply}.get(path.suffix.lower())
+    content = content_beside(path, mesh, "target.mesh", MOST_BYTES)
+    read = {".obj": _obj, ".ply": _ply}.get(Path(mesh).suffix.lower())
     if read is None:
         raise ConfigError(f"{where}: is neither .obj nor .ply; export it as one of them")
     try:
-        content = read_regular(path, MOST_BYTES)
-        if len(content) > MOST_BYTES:
-            raise ConfigError(f"{where}: more than {MOST_BYTES:,} bytes; give the target's faces alone")
-        groups = read(content, path)
-    except OSError as error:
-        raise ConfigError(f"{where}: cannot be read ({error.strerror}); check the path") from error
+        groups = read(content, path.parent / mesh)
     except ConfigError:
         raise
     except Exception as error:  # the library may raise any exception for a damaged file

@@ -85,13 +85,17 @@ def ambiguous_minimum(summary: pd.Series) -> list[Statement]:
 
 
 def far_from_coarse(estimate: pd.DataFrame, search: MountSearch) -> list[Statement]:
-    """Return the reason that the adjusted mount lies beyond the limits of its search; empty if it does not.
+    """Return the reason that the sonar's adjusted mount lies beyond the limits of its search; empty if it does not.
+
+    Of the laser the coarse mount is an observation, which :mod:`~pipeline.report.coarse_mount` tests.
 
     Parameters
     ----------
     estimate : table ``estimate`` of the adjustment
     search : limits of the mount's search
     """
+    if search.sensor == "laser":
+        return []
     rows = estimate.set_index("unknown").loc[list(MOUNT_NAMES)]
     value, sigma = (rows[name].to_numpy(np.float64) for name in ("value", "sigma_total"))
     limits = np.repeat([np.radians(search.max_angle_deg), search.max_lever_arm_m], 3)
@@ -106,8 +110,8 @@ def far_from_coarse(estimate: pd.DataFrame, search: MountSearch) -> list[Stateme
         Statement(
             ReasonCode.MOUNT_FAR_FROM_COARSE,
             f"the adjustment took the mount farther from the coarse one than {search.max_angle_deg:g}° and "
-            f"{search.max_lever_arm_m:g} m: {words}. Measure that again; if the coarse mount was right, a wall is not "
-            "where it should be below the water, or too few hold the mount, and no value of it is right",
+            f"{search.max_lever_arm_m:g} m: {words}. Measure this again. If the coarse mount was right, a wall is not "
+            "where it should be below the water, or too few walls hold the mount, and all its values are wrong",
         )
     ]
 

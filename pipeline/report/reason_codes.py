@@ -26,12 +26,12 @@ class ReasonCode(StrEnum):
     AMBIGUOUS_TARGET_POSE = "ambiguous_target_pose", "another pose of the target fits the laser points as well"
     TARGET_BEYOND_SEARCH = "target_beyond_search", "no pose of the target within the search limits fits"
     MOUNT_BEYOND_SEARCH = "mount_beyond_search", "no mount within the search limits brings the points onto the target"
-    MOUNT_FAR_FROM_COARSE = "mount_far_from_coarse", "the adjustment took the mount beyond the search limits"
     AMBIGUOUS_MOUNT = "ambiguous_mount", "another mount fits the soundings nearly as well"
 
     # The adjustment: these reject.
     NO_RESULT = "no_result", "the adjustment has no result"
     NOT_CONVERGED = "not_converged", "the adjustment did not converge"
+    MOUNT_FAR_FROM_COARSE = "mount_far_from_coarse", "the adjustment took the mount beyond the search limits"
     TOO_FEW_SOUNDINGS = "too_few_soundings", "a family of faces has too few soundings for its labels to be trusted"
     NOISE_CUT_BY_GATE = "noise_cut_by_gate", "a family's noise is wider than the labels' gate, which cuts it off"
     NO_PARAMETER_ESTIMABLE = "no_parameter_estimable", "no mount parameter of the laser is good enough"
@@ -76,6 +76,7 @@ class ReasonCode(StrEnum):
     SIGMAS_OFF_SCATTER = "sigmas_off_scatter", "slots of time scatter more than the random sigmas say"
     MANY_OUTLIERS = "many_outliers", "an unusual share of the observations was cut as outliers"
     TARGET_OFF_ORIGIN = "target_off_origin", "the target stands far from target.origin, or out of plumb"
+    WATER_CONTRADICTED = "water_contradicted", "the boat's height contradicts target.water_by_time"
     TARGET_FOUND = "target_found", "the target was found in laser points, and its faces go on below the water unproven"
     FACE_LEFT_OUT = "face_left_out", "soundings on a face are left out: below the water it does not go on as above"
     UNSEEN_FACE_ERROR = "unseen_face_error", "a wall could be off below the water unnoticed, and the mount be wrong"

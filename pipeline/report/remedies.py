@@ -35,12 +35,6 @@ REMEDIES: dict[Code, Remedy] = {
         "units of the soundings are wrong, or the clocks differ.",
         "Run poolcal check. Correct the sign or value that the reason names, and run again.",
     ),
-    Code.MOUNT_FAR_FROM_COARSE: Remedy(
-        "A wall is not where it should be below the water, and too few others hold the mount against it. Or the coarse "
-        "mount is wrong by so much.",
-        "Measure the coarse mount again. If it was right, no value of the result is: see what is below the water, and "
-        "pass more walls, or faces that look another way.",
-    ),
     Code.AMBIGUOUS_MOUNT: Remedy(
         "A second mount fits the soundings nearly as well: mostly the coarse lever arm is a block (2 e) off. Where all "
         "walls look one way, it is the sonar turned to the other side of that way.",
@@ -56,6 +50,12 @@ REMEDIES: dict[Code, Remedy] = {
         "Mostly a wrong target, or a coarse mount beyond its limits; at a wall, a plane that is off below the water.",
         "Check the pool's config. At a wall, strike the plane that the other reasons name, or one after the other, and "
         "run again; or make target.depth_m smaller by half a metre. Do not look at the residuals.",
+    ),
+    Code.MOUNT_FAR_FROM_COARSE: Remedy(
+        "A wall is not where it should be below the water, and too few others hold the mount against it. Or the coarse "
+        "mount is wrong by so much.",
+        "Measure the coarse mount again. If it was right, no value of the result is: see what is below the water, and "
+        "pass more walls, or faces that look another way.",
     ),
     Code.TOO_FEW_SOUNDINGS: Remedy(
         "Fewer than 30 soundings lie on a family of faces.",
@@ -219,6 +219,11 @@ REMEDIES: dict[Code, Remedy] = {
     Code.TARGET_OFF_ORIGIN: Remedy(
         "The target was found more than 0.1 m or 0.1° from where it should stand: its survey, or laser.mount.",
         "If it was surveyed better than that, check laser.mount and the datum of target.origin.",
+    ),
+    Code.WATER_CONTRADICTED: Remedy(
+        "Readings at other times than UTC, downward from the quay, or in centimetres; the INS's height without fixed "
+        "RTK; or the height of the INS above the water measured wrongly.",
+        "Correct target.water_by_time. A wrong level makes points of one medium those of the other, near the water.",
     ),
     Code.TARGET_FOUND: Remedy(
         "Nobody drew or surveyed the target: its faces are planes in the laser's points, continued straight down.",

@@ -18,7 +18,7 @@ from pipeline.results.mount_difference import Row, is_same_result, mount_differe
 from pipeline.results.units import Tolerances
 from pipeline.run import manifest
 
-PLACE = ("origin", "azimuth_deg", "water_level_m", "water_level_changes")  # not of its shape
+PLACE = ("origin", "azimuth_deg", "water_level_m", "water_by_time")  # not of its shape
 NO_TOLERANCES = Tolerances()
 
 

@@ -164,7 +164,10 @@ def load_scenario(path: Path | None) -> Scenario:
             known = ", ".join(names)
             raise ConfigError(f"--scenario {path}: is neither a file nor the name of a scenario; these are {known}")
         path = SCENARIOS_FOLDER / f"{path.name}.yaml"
-    return parse(Scenario, with_mesh(read_yaml(path), path), str(path))
+    scenario = parse(Scenario, with_mesh(read_yaml(path), path), str(path))
+    if scenario.target.water_by_time is not None:
+        raise ConfigError(f"{path}: target.water_by_time: simulated water stands still; take the key out")
+    return scenario
 
 
 def scenario_names() -> list[str]:

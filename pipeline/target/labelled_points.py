@@ -7,6 +7,7 @@ from functools import partial
 from itertools import pairwise
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from pipeline.artefacts.streams import Batch, BatchResult, point_array
@@ -39,8 +40,8 @@ class LabellingContext:
         The pose of the target.
     mount
         Provisional mount of the sensor that is calibrated.
-    levels_m
-        Height (p,) of the water in each pass, target frame.
+    water
+        Table water_levels.
     trajectory, corrected
         Poses of the body in the target frame, as recorded, and without the drift of the INS as far as it is known.
     laser, laser_beam_m
@@ -57,7 +58,7 @@ class LabellingContext:
     mount: ProvisionalMount
     trajectory: Trajectory
     corrected: Trajectory
-    levels_m: Array
+    water: pd.DataFrame
     laser: Mounted
     laser_beam_m: float
     mbes: SonarBeams | None
@@ -100,7 +101,7 @@ def label_batch(source: str, batch: Batch, context: LabellingContext) -> BatchRe
         raise TypeError("soundings without a sonar")
     else:
         stream, label = "soundings_labelled", partial(_label_soundings, context=context, mbes=context.mbes)
-    levels_m = context.levels_m[batch["pass"]]
+    levels_m = context.water["level_m"].to_numpy()[batch["pass"]]
     starts = np.flatnonzero(np.diff(levels_m)) + 1  # the water's level is another from there on
     pieces = [
         label({name: column[low:high] for name, column in batch.items()}, float(levels_m[low]) if high else 0.0)

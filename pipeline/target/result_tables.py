@@ -1,9 +1,12 @@
-"""Tables of stage segment: the pose of the target, and the provisional mount."""
+"""Tables of stage segment: the pose of the target, the water in each pass, and the provisional mount."""
 
 import numpy as np
 import pandas as pd
 
 from pipeline.artefacts.to_tables import xyz_columns
+from pipeline.artefacts.water_levels import water_levels
+from pipeline.config.target import Target
+from pipeline.maths.geometry.trajectory import Trajectory
 from pipeline.target.search_results import LocatedTarget, ProvisionalMount
 
 
@@ -30,6 +33,22 @@ def target_pose_table(target: LocatedTarget) -> pd.DataFrame:
     }
     row |= xyz_columns("origin_{}_pool_m", target.frame.origin_pool_m) | xyz_columns("sigma_{}_m", sigma[1:])
     return pd.DataFrame([row])
+
+
+def water_table(target: Target, trajectory: Trajectory, passes: pd.DataFrame) -> pd.DataFrame:
+    """Return the table ``water_levels``.
+
+    Parameters
+    ----------
+    target
+        The target's settings.
+    trajectory
+        Poses of the body in the target frame.
+    passes
+        Table passes.
+    """
+    levels_m, ins_m = water_levels(target, trajectory, passes["start_ns"].to_numpy(), passes["end_ns"].to_numpy())
+    return pd.DataFrame({"pass": passes["pass"], "level_m": levels_m, "ins_m": ins_m})
 
 
 def provisional_mount_table(mount: ProvisionalMount) -> pd.DataFrame:

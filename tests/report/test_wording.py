@@ -256,8 +256,8 @@ OTHERS: list[tuple[Callable[[], Iterable[Statement]], ReasonCode, str]] = [
 ]
 
 
-OF_WALLS = {  # test_wall_checks.py, test_unseen_faces.py
-    ReasonCode.FACE_LEFT_OUT, ReasonCode.ROUGH_WALL, ReasonCode.UNSEEN_FACE_ERROR,
+OF_WALLS = {  # test_wall_checks.py, test_unseen_faces.py, test_water_check.py
+    ReasonCode.FACE_LEFT_OUT, ReasonCode.ROUGH_WALL, ReasonCode.UNSEEN_FACE_ERROR, ReasonCode.WATER_CONTRADICTED,
 }  # fmt: skip
 
 

@@ -9,7 +9,7 @@ import pytest
 from tests.support.docks import of_faces
 from tests.support.simulated import calibrated, made, mount_within_its_sigmas
 
-LOW_M, RISE_M, MARGIN_M = -0.15, 0.4, 0.1
+LOW_M, RISE_M, MARGIN_M, ABOVE_M = -0.15, 0.4, 0.1, 1.3
 FIRST, SECOND = "2026-05-12T08:00:00", "2026-05-12T08:30:00"
 DOCK = of_faces(
     {
@@ -47,12 +47,15 @@ def used(found: dict[str, Any], sensor: str, number: int) -> np.ndarray:
     return rows.loc[(rows["sensor"] == sensor) & (rows["pass"] == number), "z_target_m"].to_numpy()
 
 
-@pytest.mark.parametrize("changes", ["ins", STAFF], ids=["ins", "staff"])
-def test_each_pass_has_points_up_to_its_own_water(rising: Any, changes: Any, errors_of: Any) -> None:
+BY_TIME = [{"ins_above_water_m": ABOVE_M}, {"readings": STAFF}]
+
+
+@pytest.mark.parametrize("by_time", BY_TIME, ids=["ins", "staff"])
+def test_each_pass_has_points_up_to_its_own_water(rising: Any, by_time: Any, errors_of: Any) -> None:
     session, raw = rising
-    of_water = {"water_level_m": LOW_M + RISE_M / 2, "water_level_changes": changes}
+    of_water = {"water_level_m": LOW_M, "water_by_time": by_time}
     found = calibrated(session, raw=raw, pool={"target": of_water})
-    levels = found["georeference/water_levels"]["level_m"].to_numpy()
+    levels = found["segment/water_levels"]["level_m"].to_numpy()
     assert levels == pytest.approx([LOW_M, LOW_M, LOW_M + RISE_M, LOW_M + RISE_M], abs=2e-3)
     lowest = [used(found, "laser", number).min() - level for number, level in enumerate(levels)]
     highest = [used(found, "mbes", number).max() - level for number, level in enumerate(levels)]
@@ -65,6 +68,6 @@ def test_each_pass_has_points_up_to_its_own_water(rising: Any, changes: Any, err
 def test_with_one_level_the_passes_have_points_up_to_that(rising: Any) -> None:
     session, raw = rising
     found = calibrated(session, raw=raw, pool={"target": {"water_level_m": LOW_M}}, until="adjust")
-    assert found["georeference/water_levels"]["level_m"].tolist() == [LOW_M] * 4
+    assert found["segment/water_levels"]["level_m"].tolist() == [LOW_M] * 4
     highest = [used(found, "mbes", number).max() - LOW_M for number in range(4)]
     assert highest == pytest.approx([-MARGIN_M - 0.04] * 4, abs=0.02)

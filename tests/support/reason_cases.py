@@ -64,7 +64,7 @@ REASONS: list[tuple[dict[str, Any], ReasonCode, str]] = [  # evidence, code, wor
         {"value": [-0.15, 0.0, 0.07, -0.44, 0.1, 1.694]},
         ReasonCode.MOUNT_FAR_FROM_COARSE,
         "the adjustment took the mount farther from the coarse one than 4.5° and 0.45 m: -8.6° in pitch, +1.69 m in "
-        "lever arm z. Measure that again; if the coarse mount was right, a wall",
+        "lever arm z. Measure this again. If the coarse mount was right, a wall",
     ),
     ({"count": -371}, ReasonCode.TOO_FEW_SOUNDINGS, "too few soundings lie on P2 to trust (29): sail so that the"),
     (

@@ -118,10 +118,6 @@ POSES = Artefact(
         *(Column(f"q{axis}", F64, "1", f"quaternion of R_pool_from_body, component {axis}") for axis in "wxyz"),
     ),
 )
-WATER_LEVELS = Artefact(
-    "georeference", "water_levels", "table", "the water's level in each pass",
-    (PASS, Column("level_m", F64, "m", "height of the water against the target, mean over the pass")),
-)
 LASER_POOL = Artefact(
     "georeference", "laser_pool", "stream", "laser points near the target",
     (T_NS, PASS, *float32_coordinates("laser"), *float32_coordinates("pool")),

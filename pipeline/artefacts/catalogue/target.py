@@ -33,6 +33,14 @@ FACES = Artefact(
         Column("vertices_target_m", FLOATS, "m", "corners, x y z one after another"),
     ),
 )
+WATER_LEVELS = Artefact(
+    "segment", "water_levels", "table", "the water's level in each pass",
+    (
+        PASS,
+        Column("level_m", F64, "m", "height of the water, target frame, mean over the pass"),
+        Column("ins_m", F64, "m", "height of the INS, target frame, mean over the pass"),
+    ),
+)
 TARGET_POSE = Artefact(
     "segment", "target_pose", "table", "the target as the laser sees it, relative to the pool frame (one row)",
     (
