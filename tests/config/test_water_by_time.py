@@ -148,7 +148,7 @@ def test_readings_of_a_target_that_is_to_be_found_are_refused(tmp_path: Path) ->
 
 def test_a_scenario_has_no_water_by_time(tmp_path: Path) -> None:
     path = tmp_path / "scenario.yaml"
-    target = {**LETTERS, "origin": PLACE, "water_by_time": {"ins_above_water_m": 1.3}}
+    target = {**LETTERS, "origin": PLACE, "azimuth_deg": 0.0, "water_by_time": {"ins_above_water_m": 1.3}}
     path.write_text(yaml.safe_dump({"name": "tide", "target": target}))
     with pytest.raises(ConfigError, match="simulated water stands still; take the key out"):
         load_scenario(path)
