@@ -61,7 +61,10 @@ def unsettled_labels(label_change: float) -> list[Statement]:
 
     ``label_change``: of table ``provisional_mount``.
     """
-    advice = "labels near edges may be wrong: raise segment.margin_m, and compare"
+    advice = (
+        "labels near edges may be wrong: run again with segment.margin_m: 0.03, and see that no value changes by more "
+        "than its sigma"
+    )
     if np.isnan(label_change):
         words = f"no sample of the points could be adjusted: they are labelled with the INS's drift; {advice}"
     elif label_change > MAX_LABEL_CHANGE:

@@ -134,7 +134,7 @@ OTHERS: list[tuple[Callable[[], Iterable[Statement]], ReasonCode, str]] = [
     (
         lambda: unsettled_labels(0.034),
         ReasonCode.LABELS_UNSETTLED,
-        "the last adjustment of the sample still changed 3.4 % of the labels; labels near edges may be wrong: raise",
+        "the last adjustment of the sample still changed 3.4 % of the labels; labels near edges may be wrong: run",
     ),
     (
         lambda: _one(figures_disagree(drift_figures(time_constant_s=(10.0, -2.5), horizontal_m=(0.03, 1.0)))),
