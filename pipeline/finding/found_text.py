@@ -5,8 +5,10 @@ import numpy as np
 from pipeline.console import plural
 from pipeline.finding.dry_planes import DryPlane
 from pipeline.finding.place import FoundPlace
+from pipeline.maths.surfaces.flatness import plane_axes
 from pipeline.text_table import text_table
 
+LEAST_BEFORE_M = 0.15  # of a plane from a face before which it stands
 ENOUGH = 4  # faces, of which the others show the one that is wrong
 
 
@@ -47,10 +49,24 @@ def serving_first(place: FoundPlace) -> list[DryPlane]:
 def table_rows(place: FoundPlace) -> list[list[str]]:
     """Return the rows of the table, a cell for each column; the last says why a plane cannot serve."""
     names = {id(face.plane): face.name for face in place.faces}
-    return [_row(names.get(id(plane), ""), plane, place.boat_m) for plane in serving_first(place)]
+    return [_row(names.get(id(plane), ""), plane, place.boat_m, before(place, plane)) for plane in serving_first(place)]
 
 
-def _row(name: str, plane: DryPlane, boat_m: tuple[float, float]) -> list[str]:
+def before(place: FoundPlace, plane: DryPlane) -> str:
+    """Return the name of the nearest face before which a refused plane stands, such as a moored boat; "" if none."""
+    if not plane.refused or plane.level or not len(plane.outline_m):
+        return ""
+    (middle_m,) = plane.corners_m(plane.middle_m[None])
+    found = []
+    for face in place.faces:
+        wall, along_m = face.plane, face.plane.outline_m[:, 0]  # the outline's height lacks what is hidden
+        off_m = float(middle_m @ wall.normal - wall.distance_m)
+        if off_m > LEAST_BEFORE_M and along_m.min() < middle_m @ plane_axes(wall.normal)[0] < along_m.max():
+            found.append((off_m, face.name))
+    return min(found, default=(0.0, ""))[1]
+
+
+def _row(name: str, plane: DryPlane, boat_m: tuple[float, float], hidden: str) -> list[str]:
     lies, away = "-", "-"
     if len(plane.outline_m):
         east, north = plane.corners_m(plane.middle_m[None])[0, :2] - boat_m
@@ -67,5 +83,5 @@ def _row(name: str, plane: DryPlane, boat_m: tuple[float, float]) -> list[str]:
         f"{90 - plane.tilt_deg:.1f}",
         f"{1000 * flat.uneven_m:.0f}",
         f"{plane.points:,}",
-        plane.refused and f"refused: {plane.refused}",
+        plane.refused and f"refused: {plane.refused}" + (f"; before {hidden}" if hidden else ""),
     ]

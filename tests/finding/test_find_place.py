@@ -145,3 +145,16 @@ def test_the_page_names_each_face_and_says_why_others_do_not_serve() -> None:
     assert "masks: { wall-1: [{along_m: [0.5, 1.0], height_m: [-1.0, 1.0]}] }" in page
     nothing = replace(place, faces=())
     assert place_page(nothing, "harbour").count("<img") == 1
+
+
+@pytest.mark.parametrize(
+    ("toward_m", "along_m", "hidden"), [(2.0, 0.0, "wall-2"), (0.1, 0.0, ""), (-2.0, 0.0, ""), (2.0, 20.0, "")]
+)
+def test_what_hides_a_wall_is_told_beside_it(toward_m: float, along_m: float, hidden: str) -> None:
+    """A moored boat's side, as long as the wall, before it, in it, behind it, and past its end."""
+    place = found(made(turned(20.0)))
+    (wall,) = [face.plane for face in place.faces if face.name == "wall-2"]
+    outline_m = 0.2 * (wall.outline_m - wall.middle_m) + wall.middle_m + [along_m, 0.0]
+    side = replace(wall, refused="smaller than 1 m", distance_m=wall.distance_m + toward_m, outline_m=outline_m)
+    *_, row = table_rows(replace(place, planes=(*place.planes, side)))
+    assert row[-1] == f"refused: smaller than 1 m{f'; before {hidden}' if hidden else ''}"
