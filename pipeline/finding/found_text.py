@@ -26,16 +26,18 @@ def table_text(place: FoundPlace) -> str:
             "",
             f"Origin: latitude {place.latitude_deg:.9f}, longitude {place.longitude_deg:.9f}, height "
             f"{place.height_m:.3f}; azimuth {place.azimuth_deg:.3f}°; the water is at {place.water_level_m:.3f} m.",
-            *_too_few(len(place.faces)),
+            *too_few(place),
         ]
     )
 
 
-def _too_few(faces: int) -> list[str]:
-    if faces >= ENOUGH:
+def too_few(place: FoundPlace) -> list[str]:
+    """Return the sentence that the faces are too few to test each other; empty if they are enough."""
+    if len(place.faces) >= ENOUGH:
         return []
+    faces = plural(len(place.faces), "face")
     return [
-        f"With {plural(faces, 'face')} nobody can tell which is wrong if one does not go on below the water as above: "
+        f"With {faces} nobody can tell which is wrong if one does not go on below the water as above: "
         f"pass {ENOUGH} or more."
     ]
 

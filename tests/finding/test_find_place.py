@@ -112,6 +112,7 @@ def test_the_drift_makes_no_wall_uneven(seed: int, monkeypatch: pytest.MonkeyPat
 def test_the_screen_says_what_serves_and_why_the_rest_does_not() -> None:
     said = table_text(found(made(turned(20.0))))
     assert "3 faces of" in said
+    assert "With 3 faces nobody can tell which is wrong" in said
     rows = {line.split()[0]: line.split() for line in said.splitlines() if line.lstrip().startswith("wall-")}
     assert [float(word) for word in rows["wall-2"][1:3]] == pytest.approx([110.0, 5.5], abs=2.0)  # +x, right of 20°
     assert float(rows["wall-1"][1]) > 110.0 > float(rows["wall-3"][1])  # wall-1 astern, wall-3 ahead
@@ -137,7 +138,10 @@ def test_the_page_names_each_face_and_says_why_others_do_not_serve() -> None:
     place = found(made(turned(20.0)))
     page = place_page(place, "harbour <wall>")
     assert page.startswith("<!doctype html>")
-    assert "harbour &lt;wall&gt;: 3 faces of" in page
+    four = replace(place, faces=(*place.faces, place.faces[0]))
+    assert "nobody can tell" not in place_page(four, "harbour") + table_text(four)
+    assert "harbour &lt;wall&gt;: <span>3 faces of" in page
+    assert "With 3 faces nobody can tell which is wrong" in page
     assert page.count("<img") == 2
     for row in table_rows(place):
         assert all(f">{cell}</td>" in page for cell in row if cell)
