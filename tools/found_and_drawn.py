@@ -50,7 +50,8 @@ those on the drawn one, RMS in total sigmas of the former.
 """
 FOOT = """
 Of the drawn target the sonar sees the faces that are found: the wall and both returns of the dock, not its ledges; both
-sides of the caisson's corner, not the footing; of the patent's target the fronts of the blocks, and the walls.
+sides of the caisson's corner, not the footing; of the patent's target the fronts of the blocks, and the wall between
+them. Found planes that are not drawn, such as the wall behind the patent's target, are struck.
 """
 
 
