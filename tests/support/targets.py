@@ -19,7 +19,7 @@ def members(model: TargetModel, family: str) -> tuple[int, ...]:
 
 def as_faces(target: dict[str, Any]) -> dict[str, Any]:
     """A pool's target by its letters, as the same target by its faces: plain values for YAML."""
-    place = {"origin", "azimuth_deg", "water_level_m"}
+    place = {"origin", "azimuth_deg", "water_level_m", "water_by_time"}
     letters = {name: value for name, value in target.items() if name not in place | {"kind"}}
     outlines, relations, repeats_m = patent_outlines(PatentDimensions(**letters))
     faces: dict[str, Any] = {}
