@@ -33,9 +33,8 @@ from pipeline.georeference.placement import laser_in_pool, soundings_in_pool
 from pipeline.georeference.pool_context import PoolContext
 from pipeline.gps_time import NS
 from pipeline.maths.geometry.passes import pass_of
+from pipeline.readers.unsounded_passes import FARTHEST_M
 from pipeline.target.design import target_of
-
-FARTHEST_M = 30.0  # of a pass from the target: in one farther off no point of it is used
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pipeline.errors import RawDataError
 from tests.support.docks import of_faces
 from tests.support.simulated import calibrated, made, mount_within_its_sigmas
 
@@ -71,3 +72,10 @@ def test_with_one_level_the_passes_have_points_up_to_that(rising: Any) -> None:
     assert found["segment/water_levels"]["level_m"].tolist() == [LOW_M] * 4
     highest = [used(found, "mbes", number).max() - LOW_M for number in range(4)]
     assert highest == pytest.approx([-MARGIN_M - 0.04] * 4, abs=0.02)
+
+
+def test_readings_that_end_before_a_pass_at_the_target_end_the_run(rising: Any) -> None:
+    session, raw = rising
+    of_water = {"water_by_time": {"readings": STAFF[:2]}}  # to 08:15; the second session begins at 08:30
+    with pytest.raises(RawDataError, match="do not cover the pass from 2026-05-12T08:30"):
+        calibrated(session, raw=raw, pool={"target": of_water}, until="georeference")
