@@ -32,8 +32,7 @@ from pipeline.errors import RawDataError
 from pipeline.georeference.placement import laser_in_pool, soundings_in_pool
 from pipeline.georeference.pool_context import PoolContext
 from pipeline.gps_time import NS
-from pipeline.maths.geometry.passes import pass_of
-from pipeline.readers.unsounded_passes import FARTHEST_M
+from pipeline.maths.geometry.passes import FARTHEST_PASS_M, pass_of
 from pipeline.target.design import target_of
 
 
@@ -89,7 +88,7 @@ def prepare(inputs: Inputs, config: Config) -> Prepared:
     context = PoolContext.of(inputs.trajectory, inputs.passes, inputs.pool_frame, (low - margin, high + margin))
     by_time = config.target.water_by_time
     if by_time is not None and by_time.readings is not None:
-        near = inputs.passes[inputs.passes["distance_m"].abs() <= FARTHEST_M]
+        near = inputs.passes[inputs.passes["distance_m"].abs() <= FARTHEST_PASS_M]
         if words := uncovered(by_time.readings, near["start_ns"].tolist(), near["end_ns"].tolist()):
             raise RawDataError(words)
     levels_m, _ = water_levels(config.target, context.trajectory, context.starts_ns, context.ends_ns)

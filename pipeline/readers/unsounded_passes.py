@@ -6,9 +6,8 @@ from numpy.typing import NDArray
 
 from pipeline.artefacts.catalogue.points import UNSOUNDED_PASSES
 from pipeline.maths.geometry.geodesy import PoolFrame, ecef_from_geodetic
-from pipeline.maths.geometry.passes import find_passes, pass_of
+from pipeline.maths.geometry.passes import FARTHEST_PASS_M, find_passes, pass_of
 
-FARTHEST_M = 30.0  # from the target's front: farther off the boat does not pass the target
 SOUNDED = 0.2  # share of the time abeam within passes, from which on the sonar ran
 
 
@@ -44,7 +43,7 @@ def unsounded_passes_table(
     t_ns = trajectory["t_ns"].to_numpy()
     geodetic = (trajectory[name].to_numpy() for name in ("latitude_rad", "longitude_rad", "height_m"))
     x, y = frame.points_from_ecef(ecef_from_geodetic(*geodetic))[:, :2].T
-    abeam = (x < 0) & (x > -FARTHEST_M) & (np.abs(y) <= np.abs(x))
+    abeam = (x < 0) & (x > -FARTHEST_PASS_M) & (np.abs(y) <= np.abs(x))
     sounded = pass_of(t_ns, passes["start_ns"].to_numpy(), passes["end_ns"].to_numpy()) >= 0
     directions = {float(sense) for sense in np.sign(passes["length_m"])}
     rows = []

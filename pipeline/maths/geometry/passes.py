@@ -9,6 +9,8 @@ Array = NDArray[np.float64]
 Times = NDArray[np.int64]
 Interval = tuple[int, int]
 
+FARTHEST_PASS_M = 30.0  # from the target's front: farther off the boat does not pass the target
+
 
 def split_at_gaps(t_ns: Times, max_gap_ns: int) -> list[Interval]:
     """Return the first and last time of each stretch of ascending times without a gap above ``max_gap_ns``.
