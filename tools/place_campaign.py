@@ -28,7 +28,7 @@ from tools.campaigns import DRIFT, TASKS_OF_A_WORKER
 from tools.drawn_errors import errors_at
 from tools.place_pages import summary, summary_of_rough
 from tools.places import PLACES, scenario_of_place
-from tools.rough_walls import drawn_into, drawn_names
+from tools.rough_walls import drawn_into, drawn_names, longest_wall, masks_of_things
 from tools.session_rows import error_columns, poolcal
 
 FOLDER = Path("runs/places")
@@ -142,13 +142,16 @@ def _predicted(
 
 
 def _as_it_is(found: dict[str, Any], scenario: dict[str, Any], fault: str) -> dict[str, Any]:
-    """Return what was found with the walls' roughness stated, and without the false face."""
+    """Return what was found, with the walls' roughness and masks of the things before them, without the false face."""
     rough = scenario["surroundings"]
     rms_m = float(np.hypot(rough["fouling_sigma_m"], rough["unevenness_m"]))
     stated = {"roughness_m": rms_m, "roughness_length_m": rough["unevenness_length_m"]}
-    faces = found["target"]["faces"]
-    drawn = {name: drawn_names([name], found["target"], scenario["target"])[0] for name in faces}
-    true = {name: face for name, face in faces.items() if drawn[name] != fault}
+    targets = found["target"], scenario["target"]
+    drawn = {name: drawn_names([name], *targets)[0] for name in targets[0]["faces"]}
+    true = {name: face for name, face in targets[0]["faces"].items() if drawn[name] != fault}
+    for name in true:
+        if drawn[name] == longest_wall(scenario["name"]):
+            true[name] |= {"masks": masks_of_things(rough["boxes"], scenario["name"], name, *targets)}
     return found | {"target": found["target"] | {"faces": true}, "as_built": found["as_built"] | stated}
 
 

@@ -9,6 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.config.yaml_models import parse
+from pipeline.maths.target.masks import along_face
+from pipeline.simulation.scenario import Scenario
+from pipeline.target.design import target_of
 from tools.places import FOOT_M, PLACES, TOP_M, frame_of
 
 Draws = np.random.Generator
@@ -24,6 +28,11 @@ def upright_walls(place: str) -> dict[str, Plan]:
         if len({(x, y) for x, y, _ in corners}) == 2:
             walls[name] = np.array([x0, y0]), np.array([x1, y1])
     return dict(sorted(walls.items(), key=lambda item: -float(np.linalg.norm(item[1][1] - item[1][0]))))
+
+
+def longest_wall(place: str) -> str:
+    """Return the name of the wall before which things stand."""
+    return next(iter(upright_walls(place)))
 
 
 def box_before(
@@ -57,9 +66,8 @@ def drawn_walls(place: str, seed: int) -> tuple[dict[str, Any], dict[str, Any], 
     """Return what is drawn for a session: blocks of surroundings and laser, and the planted fault, if there is one."""
     draws = np.random.default_rng([seed, 4])
     walls = upright_walls(place)
-    longest = next(iter(walls))
     surroundings = {
-        "boxes": _boxes(walls[longest], draws),
+        "boxes": _boxes(walls[longest_wall(place)], draws),
         "fouling_m": draws.uniform(0.0, 0.03),
         "fouling_sigma_m": draws.uniform(0.0, 0.015),
         "unevenness_m": draws.uniform(0.0, 0.003),
@@ -92,6 +100,25 @@ def drawn_names(families: Iterable[str], found: dict[str, Any], drawn: dict[str,
         near = _off_m(np.array(drawn["faces"][best]["corners"]), place) < NEAR_M
         names.append(best if near else f"?{family}")
     return names
+
+
+def masks_of_things(
+    boxes: Iterable[dict[str, Any]], place: str, face: str, found: dict[str, Any], drawn: dict[str, Any]
+) -> list[dict[str, list[float]]]:
+    """Return masks of a found face, the longest wall, where things stand against it: fenders, rungs, a footing."""
+    faces = target_of(parse(Scenario, {"name": place, "target": found}, place).target).faces
+    (seen,) = (one for one in faces if one.name == face)
+    start, end = upright_walls(place)[longest_wall(place)]
+    along = (end - start) / np.linalg.norm(end - start)
+    masks = []
+    for box in boxes:
+        low, high = np.array(box["low_m"]), np.array(box["high_m"])
+        ends = (low + high)[:2] / 2 + np.outer([-0.5, 0.5], (high - low)[1] * along)
+        points = np.column_stack([ends, np.zeros(2)])
+        span = np.sort(along_face(seen, frame_of(found).points_from_ecef(frame_of(drawn).points_to_ecef(points))))
+        if box["name"] != "boat":
+            masks.append({"along_m": span.tolist(), "height_m": [box["low_m"][2], box["high_m"][2]]})
+    return masks
 
 
 def _off_m(corners_m: np.ndarray, place_m: np.ndarray) -> float:

@@ -72,8 +72,12 @@ def with_found(content: dict[str, Any], path: Path, find: Find | None) -> dict[s
         for name in names:
             if name not in faces:
                 raise ConfigError(f"{path}: target.{key}: {name!r}: no such face was found, but {', '.join(faces)}")
-    masks = {name: {"masks": [one.model_dump(mode="json") for one in each]} for name, each in wanted.masks.items()}
-    left = {name: face | masks.get(name, {}) for name, face in faces.items() if name not in wanted.strike}
+    masks = {name: [one.model_dump(mode="json") for one in each] for name, each in wanted.masks.items()}
+    left = {
+        name: face | {"masks": [*face.get("masks", []), *masks[name]]} if name in masks else face
+        for name, face in faces.items()
+        if name not in wanted.strike
+    }
     if not left:
         raise ConfigError(f"{path}: target.strike: no face is left of {', '.join(faces)}; leave one, or more")
     built = content.get("as_built")

@@ -1,7 +1,7 @@
 """Planes above the water in the laser's points: which can serve, which cannot and why, and where the water is."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -9,8 +9,11 @@ from numpy.typing import NDArray
 
 from pipeline.artefacts.streams import Mapper, serial
 from pipeline.errors import RawDataError
+from pipeline.finding.dry_plane import DryPlane
+from pipeline.finding.gaps import EMPTY, USUAL, dry_gaps
+from pipeline.finding.stacked_planes import with_stacks_joined
 from pipeline.maths.adjustment.profiles import NORMAL
-from pipeline.maths.surfaces.flatness import Flatness, cells_of, flatness, of_one_surface, plane_axes
+from pipeline.maths.surfaces.flatness import cells_of, flatness, of_one_surface, plane_axes
 from pipeline.maths.surfaces.growing import GrowthLimits, Plane, grown_regions, plane_of_voxels
 from pipeline.maths.surfaces.outline import area, convex_hull, inside, shrunk, simplified
 from pipeline.maths.surfaces.voxels import voxels_with_rows
@@ -27,51 +30,10 @@ MARGIN_M, CORNERS = 0.1, 8  # of the outline: inside the outermost cells' means;
 EDGE_CELL_M, EDGE_MARGIN_M = 0.1, 0.05  # the same of the last outline, where the points are dense enough
 BEYOND_M = VOXEL_M + MARGIN_M  # so far outside the first outline the last one may lie
 WAVES_M, OF_HEIGHT = 0.3, 0.25  # above the lowest points: waves, splash, the water's echoes; at most this share
-LEAST_M, UNEVEN_M, BOW_M, COVERED = 1.0, 0.03, 0.03, 0.6  # extent; RMS; height of a bow; share of the cells seen
+LEAST_M, UNEVEN_M, BOW_M, COVERED = 1.0, 0.03, 0.03, 0.6  # extent; RMS; bow; share of cells seen, but for gaps
 RISE_M, FEW_M2 = 0.4, 0.1  # least rise of its dry part; area of the densest plane with as many points as it needs
-LEVEL_DEG = 10.0  # a plane that is less inclined is a deck, a quay's top or the water
 NEAR_WATER_M = 0.5  # largest height of a plane's lower end above the water
 COLUMN_SPREAD_M, FEWEST_COLUMNS, FULL = 0.1, 6, 20  # columns of points that end at the water; points of a column
-
-
-@dataclass(frozen=True)
-class DryPlane:
-    """A plane of the cloud, frame of the points: ``normal · x = distance_m``, the normal toward the boat.
-
-    outline_m (k, 2): its dry part along ``plane_axes(normal)``; lowest_m: z of its lower end; column_ends_m: z at which
-    columns of its points end; sample_m (k, 3): of some of its points the place along the first axis, the height z, and
-    the distance from the plane; refused: why it cannot serve, "" if it can.
-    """
-
-    normal: Array
-    distance_m: float
-    rms_m: float
-    points: int
-    flat: Flatness
-    outline_m: Array
-    lowest_m: float
-    column_ends_m: Array
-    sample_m: Array
-    refused: str = ""
-
-    @property
-    def tilt_deg(self) -> float:
-        """Return the inclination from level, 90: upright; above 90: it overhangs."""
-        return float(np.degrees(np.arccos(np.clip(self.normal[2], -1.0, 1.0))))
-
-    @property
-    def level(self) -> bool:
-        """Return whether the plane is a deck, a quay's top or the water."""
-        return min(self.tilt_deg, 180 - self.tilt_deg) < LEVEL_DEG
-
-    @property
-    def middle_m(self) -> Array:
-        """Return the middle (2,) of the outline's extent along the axes of the plane."""
-        return np.asarray((self.outline_m.min(axis=0) + self.outline_m.max(axis=0)) / 2)
-
-    def corners_m(self, outline_m: Array) -> Array:
-        """Return the corners (k, 3) of an outline (k, 2) in the plane."""
-        return np.asarray(outline_m @ plane_axes(self.normal) + self.distance_m * self.normal)
 
 
 def dry_planes(points_m: Array, boat_m: Array, mapper: Mapper = serial) -> list[DryPlane]:
@@ -94,9 +56,10 @@ def dry_planes(points_m: Array, boat_m: Array, mapper: Mapper = serial) -> list[
     of_point = number[row]
     order = np.argsort(of_point, kind="stable")
     ends = np.searchsorted(of_point[order], np.arange(len(regions) + 1))
-    of_regions = (order[ends[k] : ends[k + 1]] for k in range(len(regions)))
-    grown = (plane_of_voxels(voxels, rows) for rows in regions)
-    found = mapper(partial(_plane, points_m, boat_m=boat_m), of_regions, grown)
+    of_regions = [order[ends[k] : ends[k + 1]] for k in range(len(regions))]
+    plane_of = partial(_plane, points_m, boat_m=boat_m)
+    found = list(mapper(plane_of, of_regions, (plane_of_voxels(voxels, rows) for rows in regions)))
+    found = with_stacks_joined(found, of_regions, plane_of)
     return _dense_enough(sorted(found, key=lambda plane: -plane.flat.width_m * plane.flat.height_m))
 
 
@@ -111,8 +74,8 @@ def _dense_enough(planes: Sequence[DryPlane]) -> list[DryPlane]:
     ]
 
 
-def _plane(all_m: Array, rows: Integers, grown: Plane, boat_m: Array) -> DryPlane:
-    """Return the plane of a region, toward the boat; rows: of its points among all.
+def _plane(all_m: Array, rows: Integers, grown: Plane | DryPlane, boat_m: Array) -> DryPlane:
+    """Return the plane of a region, toward the boat; rows: of its points among all; grown: about the plane.
 
     A grown region goes round its corners: by 6 cm into the next wall, which turns the plane of 3 m by 0.4°. So the
     plane is fitted again, to the means of the cells that lie on it, until it stays. Points just above the water are not
@@ -136,7 +99,8 @@ def _plane(all_m: Array, rows: Integers, grown: Plane, boat_m: Array) -> DryPlan
     sense = 1.0 if normal @ boat_m > distance_m else -1.0
     normal, distance_m = sense * normal, sense * distance_m
     _, outline = _cells_on(dry_m, normal, distance_m, CELL_M, MARGIN_M)
-    outline = _near_the_edge(all_m, normal, distance_m, outline, waves_m)
+    on_m = all_m[(np.abs(all_m @ normal - distance_m) <= UNEVEN_M) & (all_m[:, 2] > waves_m)]
+    outline = _near_the_edge(on_m, normal, outline)
     away = points_m @ normal - distance_m
     on = np.abs(away) <= OFF_M
     in_plane, heights, away = points_m[on] @ plane_axes(normal).T, points_m[on, 2], away[on]
@@ -156,23 +120,25 @@ def _plane(all_m: Array, rows: Integers, grown: Plane, boat_m: Array) -> DryPlan
         lowest_m=float(np.quantile(heights, 0.01)) if len(heights) else np.inf,
         column_ends_m=_column_ends(in_plane[:, 0], heights),
         sample_m=np.column_stack([in_plane[:, 0], heights, away])[:: max(1, len(heights) // SAMPLE)],
+        gaps_m=dry_gaps(on_m[inside(outline, on_m @ plane_axes(normal).T), 2]),
     )
     return replace(made, refused=_refusal(made))
 
 
-def _near_the_edge(points_m: Array, normal: Array, distance_m: float, coarse: Array, above_m: float) -> Array:
-    """Return the outline (k, 2) of the points of small cells above a height; the coarse one if they are too few.
+def _near_the_edge(on_m: Array, normal: Array, coarse: Array) -> Array:
+    """Return the outline (k, 2) of the points (n, 3) on a plane by small cells; the coarse one if they are too few.
 
     Means of the outermost cells lie up to half a cell inside the edge, and voxels at a corner belong to neither wall:
     together a fifth of a narrow wall's points. So the outline is that of the outermost cells' points themselves.
     """
     if len(coarse) < 3:
         return coarse
-    on = points_m[(np.abs(points_m @ normal - distance_m) <= UNEVEN_M) & (points_m[:, 2] > above_m)]
-    in_plane, low, high = on @ plane_axes(normal).T, coarse.min(axis=0), coarse.max(axis=0)
+    in_plane, low, high = on_m @ plane_axes(normal).T, coarse.min(axis=0), coarse.max(axis=0)
     in_plane = in_plane[np.all((in_plane > low - BEYOND_M) & (in_plane < high + BEYOND_M), axis=1)]
     cells, inverse, count = cells_of(in_plane, EDGE_CELL_M)
-    full, middles_m = count >= FEWEST, np.asarray((cells + 0.5) * EDGE_CELL_M, dtype=np.float64)
+    usual = float(np.quantile(count[count >= FEWEST], USUAL)) if np.any(count >= FEWEST) else 0.0
+    full = count >= max(FEWEST, EMPTY * usual)  # beside a wall's end, points of the next one lie in its plane
+    middles_m = np.asarray((cells + 0.5) * EDGE_CELL_M, dtype=np.float64)
     if full.sum() * EDGE_CELL_M**2 < COVERED * area(coarse):
         return coarse
     outermost = full & ~inside(shrunk(convex_hull(middles_m[full]), EDGE_CELL_M), middles_m)
@@ -221,7 +187,7 @@ def _refusal(plane: DryPlane) -> str:
         return f"uneven, {1000 * flat.uneven_m:.0f} mm"
     if flat.bow_m > BOW_M:
         return f"bent by {1000 * flat.bow_m:.0f} mm"
-    if flat.covered < COVERED:
+    if flat.covered < COVERED * (1 - float(np.diff(plane.gaps_m, axis=1).sum()) / rise_m):
         return f"only {100 * flat.covered:.0f} % of it seen"
     return ""
 

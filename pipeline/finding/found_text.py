@@ -3,8 +3,8 @@
 import numpy as np
 
 from pipeline.console import plural
-from pipeline.finding.dry_planes import DryPlane
-from pipeline.finding.place import FoundPlace
+from pipeline.finding.dry_plane import DryPlane
+from pipeline.finding.place import FoundFace, FoundPlace
 from pipeline.maths.surfaces.flatness import plane_axes
 from pipeline.text_table import text_table
 
@@ -26,9 +26,25 @@ def table_text(place: FoundPlace) -> str:
             "",
             f"Origin: latitude {place.latitude_deg:.9f}, longitude {place.longitude_deg:.9f}, height "
             f"{place.height_m:.3f}; azimuth {place.azimuth_deg:.3f}°; the water is at {place.water_level_m:.3f} m.",
-            *too_few(place),
+            *remarks(place),
         ]
     )
+
+
+def remarks(place: FoundPlace) -> list[str]:
+    """Return what is to be said of the faces: sentences of gaps, and that they are too few to test each other."""
+    return [*(_of_gaps(face) for face in place.faces if len(face.gaps_m)), *too_few(place)]
+
+
+def _of_gaps(face: FoundFace) -> str:
+    """Return the sentence of a face's gaps."""
+    gaps = ", ".join(f"{low:.2f}–{high:.2f}" for low, high in face.gaps_m[face.gaps_m[:, 0] > 0])
+    if np.any(face.gaps_m[:, 1] <= 0):
+        return (
+            f"{face.name} has gaps at {gaps} m above the water; they repeat, and are taken to go on below it: "
+            "no point in them counts."
+        )
+    return f"{face.name} has gaps at {gaps} m above the water: no point in them counts."
 
 
 def too_few(place: FoundPlace) -> list[str]:

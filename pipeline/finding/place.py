@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import RawDataError
-from pipeline.finding.dry_planes import DryPlane
+from pipeline.finding.dry_plane import DryPlane
+from pipeline.finding.gaps import continued_gaps
 from pipeline.maths.geometry.geodesy import PoolFrame, geodetic_from_ecef
 from pipeline.maths.surfaces.flatness import plane_axes
 from pipeline.maths.surfaces.outline import bent, clipped, convex_hull
@@ -26,13 +27,15 @@ DIGITS, ANGLE_DIGITS = 3, 9  # decimals of metres, and of latitude and longitude
 class FoundFace:
     """A face: its name, and its corners (k, 3), counter-clockwise as the boat sees them, target frame.
 
-    continued_m (k, 2): the same along the axes of its plane.
+    continued_m (k, 2): the same along the axes of its plane; gaps_m (k, 2): heights above the water, lower and upper
+    end, at which no point counts.
     """
 
     name: str
     corners_m: Array
     plane: DryPlane
     continued_m: Array
+    gaps_m: Array
 
 
 @dataclass(frozen=True)
@@ -109,7 +112,7 @@ def found_place(planes: Sequence[DryPlane], level_m: float, frame: PoolFrame, de
         height_m=height_m,
         azimuth_deg=azimuth_deg,
         water_level_m=round(float(water), DIGITS) + 0.0,  # no -0.0
-        faces=_named(faces),
+        faces=_named(faces, level_m, depth_m),
         planes=tuple(judged),
         level_m=level_m,
     )
@@ -131,12 +134,16 @@ def _continued(plane: DryPlane, level_m: float, depth_m: float) -> Array:
     return bent(convex_hull(np.concatenate([plane.outline_m, _at_height(plane, level_m - depth_m)])), BEND_M)
 
 
-def _named(faces: Sequence[tuple[DryPlane, Array, Array]]) -> tuple[FoundFace, ...]:
+def _named(
+    faces: Sequence[tuple[DryPlane, Array, Array]], level_m: float, depth_m: float
+) -> tuple[FoundFace, ...]:
     """Return the faces with names: walls and slopes, numbered along y."""
     counts = {"wall": 0, "slope": 0}
     named = []
     for plane, corners, continued in sorted(faces, key=lambda face: float(face[1][:, 1].mean())):
         kind = "wall" if abs(plane.tilt_deg - 90) < UPRIGHT_DEG else "slope"
         counts[kind] += 1
-        named.append(FoundFace(f"{kind}-{counts[kind]}", corners, plane, continued))
+        gaps = plane.gaps_m if kind == "wall" else np.empty((0, 2))  # a slope's gaps have no one height
+        gaps = np.round(continued_gaps(gaps - level_m, -depth_m), DIGITS) + 0.0
+        named.append(FoundFace(f"{kind}-{counts[kind]}", corners, plane, continued, gaps))
     return tuple(named)

@@ -41,7 +41,8 @@ def pool_yaml(place: FoundPlace) -> str:
     for face in place.faces:
         rows = np.round(face.corners_m, DIGITS) + 0.0  # no -0.0
         corners = ", ".join("[" + ", ".join(f"{value:.{DIGITS}f}" for value in row) + "]" for row in rows)
-        lines.append(f"    {face.name}: {{corners: [{corners}]}}")
+        gaps = ", ".join(f"{{height_m: [{low:.{DIGITS}f}, {high:.{DIGITS}f}]}}" for low, high in face.gaps_m)
+        lines.append(f"    {face.name}: {{corners: [{corners}]" + (f", masks: [{gaps}]}}" if gaps else "}"))
     return "\n".join(lines) + "\n" + AS_BUILT
 
 

@@ -16,7 +16,7 @@ from pipeline.adjustment.problem import CalibrationProblem, PointNoise, PriorInf
 from pipeline.adjustment.weighted_iteration import weighted_iteration
 from pipeline.artefacts.streams import Batch, Mapper, MemoryPart, Stream, serial
 from pipeline.config.pool import Adjust, Ingest
-from pipeline.finding.dry_planes import DryPlane
+from pipeline.finding.dry_plane import DryPlane
 from pipeline.finding.kept_points import KeptPoints
 from pipeline.maths.adjustment.body_motion import BodyMotion
 from pipeline.maths.adjustment.face_shifts import Faces

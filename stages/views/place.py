@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.atomic_files import write_bytes
-from pipeline.finding.dry_planes import DryPlane
+from pipeline.finding.dry_plane import DryPlane
 from pipeline.finding.place import FoundFace, FoundPlace
 from pipeline.maths.surfaces.flatness import plane_axes
 from stages.views.blueprint import place_blueprint

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.errors import RawDataError
+from pipeline.finding.dry_plane import DryPlane
 from pipeline.finding.dry_planes import (
     BOW_M,
     CELL_M,
@@ -14,7 +15,6 @@ from pipeline.finding.dry_planes import (
     NEAR_WATER_M,
     UNEVEN_M,
     WAVES_M,
-    DryPlane,
     dry_planes,
     reaching_water,
     water_level_m,

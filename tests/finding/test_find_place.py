@@ -7,11 +7,8 @@ import numpy as np
 import pytest
 import yaml
 
-from pipeline.artefacts.streams import MemoryPart, Stream
 from pipeline.config.pool import PoolConfig
-from pipeline.config.session import SessionConfig
 from pipeline.config.yaml_models import parse
-from pipeline.finding.find import find_place
 from pipeline.finding.found_text import table_rows, table_text
 from pipeline.finding.place import FoundPlace
 from pipeline.finding.pool_file import pool_yaml
@@ -21,6 +18,7 @@ from pipeline.results.pages.place_page import place_page
 from pipeline.simulation.session import SimulatedSession
 from pipeline.target.design import target_of
 from tests.support.docks import DOCK
+from tests.support.found_places import found
 from tests.support.simulated import made
 
 TRACK: dict[str, Any] = {"track": {"distances_m": [4.0, 7.0], "half_length_m": 6.0}}
@@ -28,13 +26,6 @@ TRACK: dict[str, Any] = {"track": {"distances_m": [4.0, 7.0], "half_length_m": 6
 
 def turned(azimuth_deg: float, water_level_m: float = 0.0) -> dict[str, Any]:
     return DOCK | TRACK | {"target": DOCK["target"] | {"azimuth_deg": azimuth_deg, "water_level_m": water_level_m}}
-
-
-def found(session: SimulatedSession, depth_m: float = 4.0) -> FoundPlace:
-    settings = parse(SessionConfig, session.session, "session")
-    raw = {"ins": session.ins, "laser": session.laser}
-    streams = (Stream((MemoryPart(name, columns),)) for name, columns in raw.items())
-    return find_place(*streams, settings, depth_m)
 
 
 def planes_level(pool: PoolConfig) -> tuple[PoolFrame, TargetModel]:

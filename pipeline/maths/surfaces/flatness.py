@@ -19,6 +19,7 @@ Integers = NDArray[np.int64]
 FEWEST = 4  # points of a cell that counts
 FEWEST_CELLS = 8  # cells for a surface of second order
 THICK, THIN_M = 2.5, 0.01  # a cell sees two surfaces if its points scatter by more, in quartiles of the cells, and m
+FEW = 0.1  # of the points of the median cell: one with fewer tells nothing of the surface's form
 COUNTED = 1_000_000  # cells, with points or without, that are counted however few the points are
 
 
@@ -26,7 +27,8 @@ COUNTED = 1_000_000  # cells, with points or without, that are counted however f
 class Flatness:
     """width_m, height_m: extent along the first and the second axis of the cells' points; uneven_m: RMS of their means.
 
-    bow_m: height that the second order reaches, 0 with few cells; covered: cells with points, as a share of those
+    bow_m: height that the second order reaches, 0 with few cells; both by cells that see one surface, and do not have
+    few points beside the others, as at the edge of what stands behind. covered: cells with points, as a share of those
     within the extent.
     """
 
@@ -91,9 +93,12 @@ def flatness(in_plane_m: Array, away_m: Array, cell_m: float) -> Flatness:
     use = count >= FEWEST
     if not use.any():
         return Flatness(0.0, 0.0, 0.0, 0.0, 0.0)
-    mean = np.bincount(inverse, weights=away_m, minlength=len(keys))[use] / count[use]
-    totals = np.array([np.bincount(inverse, weights=axis, minlength=len(keys)) for axis in in_plane_m.T])
-    place = totals[:, use] / count[use]
+    totals = np.array(
+        [np.bincount(inverse, weights=axis, minlength=len(keys)) for axis in (*in_plane_m.T, away_m)]
+    )
+    u, w, mean = totals[:, use] / count[use]
+    single = count[use] >= FEW * np.median(count[use])
+    place, mean = np.array([u, w])[:, single], mean[single]
     spans = np.ptp(keys[use], axis=0) + 1
     width, height = np.ptp(in_plane_m[use[inverse]], axis=0).tolist()
     plane = _design(place)[:, :3]

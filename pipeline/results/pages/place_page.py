@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pipeline.console import plural
-from pipeline.finding.dry_planes import DryPlane
-from pipeline.finding.found_text import serving_first, table_rows, too_few
+from pipeline.finding.dry_plane import DryPlane
+from pipeline.finding.found_text import remarks, serving_first, table_rows
 from pipeline.finding.place import FoundFace, FoundPlace
 from pipeline.maths.surfaces.flatness import plane_axes
 from pipeline.results.pages.rendering import INK, LASER, QUIET, WIDTH_IN, drawing_style, picture, render_page
@@ -34,7 +34,7 @@ def place_page(place: FoundPlace, session: str) -> str:
     return render_page(
         "place.html",
         session=session,
-        sentences=[f"{serve}.", *too_few(place)],
+        sentences=[f"{serve}.", *remarks(place)],
         plan=plan,
         faces=faces,
         first=place.faces[0].name if place.faces else "",
