@@ -59,7 +59,7 @@ def dry_planes(points_m: Array, boat_m: Array, mapper: Mapper = serial) -> list[
     of_regions = [order[ends[k] : ends[k + 1]] for k in range(len(regions))]
     plane_of = partial(_plane, points_m, boat_m=boat_m)
     found = list(mapper(plane_of, of_regions, (plane_of_voxels(voxels, rows) for rows in regions)))
-    found = with_stacks_joined(found, of_regions, plane_of)
+    found = with_stacks_joined(found, of_regions, order[: ends[0]], points_m, plane_of)
     return _dense_enough(sorted(found, key=lambda plane: -plane.flat.width_m * plane.flat.height_m))
 
 

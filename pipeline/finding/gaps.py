@@ -17,7 +17,7 @@ FULL = 20  # points of a usual bin: with fewer the bins must be higher
 EMPTY = 0.1  # of the points of a usual bin: a bin with fewer belongs to a gap
 LEAST_M = 0.1  # a lower gap is none: less than the margin that soundings keep from both its ends
 ALIKE_M = 0.04  # largest difference of gaps of one height, and of their places from a regular row
-FURTHER_M = 0.01  # by which the place of a gap is less certain with each repeat
+FURTHER_M = 0.005  # by which the place of a gap is less certain with each repeat
 MOST = 60  # gaps of a face
 
 
@@ -26,7 +26,7 @@ def dry_gaps(heights_m: Array) -> Array:
 
     >>> courses = [np.arange(low, low + 0.5, 0.001) for low in (0.0, 1.0, 2.0)]
     >>> dry_gaps(np.concatenate(courses)).round(2).tolist()
-    [[0.5, 1.0], [1.5, 2.0]]
+    [[0.49, 1.01], [1.49, 2.01]]
     """
     none = np.empty((0, 2))
     if len(heights_m) < FULL:
@@ -40,9 +40,9 @@ def dry_gaps(heights_m: Array) -> Array:
         if bin_m >= COARSEST_M:
             return none
         bin_m *= 2
-    full = np.flatnonzero(counts >= EMPTY * usual)
-    ends = [(low + bin_m * (below + 1), low + bin_m * above) for below, above in pairwise(full.tolist())]
-    return np.array([end for end in ends if end[1] - end[0] >= LEAST_M - bin_m / 2]).reshape(-1, 2)
+    full = np.flatnonzero(counts >= EMPTY * usual)  # a bin at an end is half full in the mean
+    ends = [(low + bin_m * (below + 0.5), low + bin_m * (above + 0.5)) for below, above in pairwise(full.tolist())]
+    return np.array([end for end in ends if end[1] - end[0] >= LEAST_M + bin_m / 2]).reshape(-1, 2)
 
 
 def continued_gaps(gaps_m: Array, lowest_m: float) -> Array:
@@ -51,7 +51,7 @@ def continued_gaps(gaps_m: Array, lowest_m: float) -> Array:
     Nobody has seen these: each is a little higher than the one above it.
 
     >>> continued_gaps(np.array([[0.5, 1.0], [1.5, 2.0]]), -1.0).round(2).tolist()
-    [[-0.51, 0.01], [0.5, 1.0], [1.5, 2.0]]
+    [[-0.5, 0.0], [0.5, 1.0], [1.5, 2.0]]
     """
     if len(gaps_m) < 2:
         return gaps_m

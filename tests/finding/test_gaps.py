@@ -41,11 +41,11 @@ def test_few_points_show_no_gaps(per_m: float, found: int) -> None:
 
 
 def test_regular_gaps_go_on_to_the_lowest_height() -> None:
-    """One metre apart: those that end above -2.6 m. Each is 2 cm higher than the last, about the same middle."""
+    """One metre apart: those that end above -2.6 m. Each is 1 cm higher than the last, about the same middle."""
     gaps = np.array([[0.4, 0.9], [1.4, 1.9], [2.4, 2.9]])
     below = continued_gaps(gaps, -2.6)[:-3]
     np.testing.assert_allclose(below.mean(axis=1), [-2.35, -1.35, -0.35])
-    np.testing.assert_allclose(np.diff(below, axis=1)[:, 0], [0.56, 0.54, 0.52])
+    np.testing.assert_allclose(np.diff(below, axis=1)[:, 0], [0.53, 0.52, 0.51])
     np.testing.assert_array_equal(continued_gaps(gaps, -2.6)[-3:], gaps)
 
 

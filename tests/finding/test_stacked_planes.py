@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.finding.dry_planes import dry_planes
-from pipeline.finding.stacked_planes import GAP_M, SAME_M
+from pipeline.finding.stacked_planes import DENSE, GAP_M, SAME_M
 
 BOAT = np.array([294.0, -700.0, 9.5])
 
@@ -18,6 +18,23 @@ def part(along: tuple[float, float], up: tuple[float, float], off_m: float = 0.0
 
 
 LOWER = part((0.0, 3.0), (0.0, 1.6))
+
+
+def test_a_course_too_low_for_a_region_joins() -> None:
+    """It is 0.3 m high, as a voxel, 0.6 m over the wall."""
+    (wall,) = dry_planes(np.concatenate([LOWER, part((0.0, 3.0), (2.2, 2.5), seed=2)]), BOAT)
+    assert wall.flat.height_m == pytest.approx(2.5, abs=0.3)
+    np.testing.assert_allclose(wall.gaps_m, [[8.0 + 1.6, 8.0 + 2.2]], atol=0.04)
+
+
+@pytest.mark.parametrize(("share", "lowest_m"), [(2 * DENSE, 8.0 - 2.0), (0.5 * DENSE, 8.0)])
+@pytest.mark.parametrize("up", [(-2.0, -0.6), (-2.0, -1.8)])
+def test_the_image_of_a_wall_in_the_water_does_not_join(share: float, lowest_m: float, up: tuple[float, float]) -> None:
+    """What has 0.15 of the wall's points to each square metre does not join, be it a plane or a course; 0.6 does."""
+    image = part((0.0, 3.0), up, seed=2)
+    points = np.concatenate([LOWER, image[: round(share * len(image))]])
+    wall = max(dry_planes(points, BOAT), key=lambda plane: plane.points)
+    assert wall.lowest_m == pytest.approx(lowest_m, abs=0.06)
 
 
 def serving(upper: np.ndarray) -> list[float]:
