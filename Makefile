@@ -135,8 +135,8 @@ montecarlo: $(SETUP) ## many simulated sessions: are the predicted sigmas true?
 	$(PY) -m tools.stress
 	$(PY) -m tools.course_campaigns > docs/accuracy/courses.md
 	$(PY) -m tools.place_campaign > docs/accuracy/places.md
-	$(PY) -m tools.place_campaign --rough --sessions 60 > docs/accuracy/walls.md
-	$(PY) -m tools.found_and_drawn --sessions 10 > docs/accuracy/found-and-drawn.md
+	$(PY) -m tools.place_campaign --rough --sessions 75 > docs/accuracy/walls.md
+	$(PY) -m tools.found_and_drawn --sessions 20 > docs/accuracy/found-and-drawn.md
 	$(PY) -m tools.patch_campaign > docs/accuracy/patch.md
 	$(PY) -m tools.accuracy
 	$(PY) -m tools.patent_forms docs/patent.md

@@ -6,6 +6,7 @@ in runs/places/ (``tools.campaign_files``).
 
     python -m tools.place_campaign [--only wall return ...] [--sessions 60] [--jobs 2] [--resume] > FILE.md
     python -m tools.place_campaign --rough [...]   # walls as they are (tools.rough_walls): what is accepted, left out
+    python -m tools.place_campaign --noise [...]   # with the noise and the drift alone: whether the random sigmas hold
 """
 
 import argparse
@@ -26,7 +27,7 @@ from pipeline.target.design import target_of
 from tools.campaign_files import collect_rows
 from tools.campaigns import DRIFT, TASKS_OF_A_WORKER
 from tools.drawn_errors import errors_at
-from tools.place_pages import summary, summary_of_rough
+from tools.place_pages import summary, summary_of_noise, summary_of_rough
 from tools.places import PLACES, scenario_of_place
 from tools.rough_walls import drawn_into, drawn_names, longest_wall, masks_of_things
 from tools.session_rows import error_columns, poolcal
@@ -43,20 +44,22 @@ TARGET = {"kind": "found", "depth_m": 4.0}
 class Task:
     """A session: its place, and its seed; whether the plan's sigmas are wanted.
 
-    rough: the walls are as they are.
+    rough: the walls are as they are; noise: there are no systematic errors.
     """
 
     place: str
     seed: int
     planned: bool = False
     rough: bool = False
+    noise: bool = False
 
 
 def row_of(task: Task) -> dict[str, Any]:
     """Simulate and calibrate a session; return its row. A place without a target has the program's words as reason."""
     bare = scenario_of_place(task.place, {"ins": DRIFT})
     model = target_of(parse(Scenario, bare, "place").target)
-    scenario = scenario_of_place(task.place, {"ins": DRIFT}, errors_at(model, task.seed, AS_BUILT))
+    errors = {} if task.noise else errors_at(model, task.seed, AS_BUILT)
+    scenario = scenario_of_place(task.place, {"ins": DRIFT}, errors)
     row: dict[str, Any] = {"place": task.place, "seed": task.seed}
     if task.rough:
         row |= drawn_into(scenario, task.place, task.seed)
@@ -162,18 +165,22 @@ def main() -> None:
     parser.add_argument("--sessions", type=int, default=60, help="of each place; default: 60")
     parser.add_argument("--jobs", type=int, default=2, help="sessions at a time; default: 2")
     parser.add_argument("--rough", action="store_true", help="walls as they are, with a false wet face in every second")
+    parser.add_argument("--noise", action="store_true", help="without systematic errors, the random sigmas alone")
+    parser.add_argument("--first", type=int, default=0, help="number of the first session; default: 0")
     parser.add_argument("--resume", action="store_true", help="keep the rows of an interrupted campaign")
     given = parser.parse_args()
     tables = []
     for place in given.only or (ROUGH_PLACES if given.rough else PLACES):
-        first = FIRST_SEED + 1000 * list(PLACES).index(place)
+        first = FIRST_SEED + 1000 * list(PLACES).index(place) + given.first
+        planned = given.sessions if given.rough else 0 if given.noise else PLANNED
         tasks = [
-            Task(place, first + k, planned=k < PLANNED or given.rough, rough=given.rough)
+            Task(place, first + k, planned=k < planned, rough=given.rough, noise=given.noise)
             for k in range(given.sessions)
         ]
-        path = FOLDER / f"{'rough-' * given.rough}{place}.parquet"
+        path = FOLDER / f"{'rough-' * given.rough}{'noise-' * given.noise}{place}.parquet"
         tables.append(collect_rows(path, row_of, tasks, given.jobs, given.resume, TASKS_OF_A_WORKER))
-    print((summary_of_rough if given.rough else summary)(pd.concat(tables)), end="")
+    page = summary_of_rough if given.rough else summary_of_noise if given.noise else summary
+    print(page(pd.concat(tables)), end="")
 
 
 if __name__ == "__main__":

@@ -4,7 +4,8 @@ import numpy as np
 import pandas as pd
 
 from pipeline.report.reason_codes import WEAK_ALONE
-from tools.campaign_statistics import nse_band
+from tools.campaign_statistics import HEAD as STATISTICS_HEAD
+from tools.campaign_statistics import markdown_row, nse_band, statistics_of
 from tools.session_rows import NAMES
 
 HEAD = """# Places that nobody has drawn
@@ -62,6 +63,14 @@ def _line(place: str, rows: pd.DataFrame) -> str:
     return f"| {' | '.join(cells)} |"
 
 
+def summary_of_noise(table: pd.DataFrame) -> str:
+    """Return the table of sessions without systematic errors in Markdown: whether the random sigmas hold."""
+    table = table.assign(accepted=table["verdict"] == "accepted")
+    groups = table.groupby("place", sort=False)
+    rows = [markdown_row(str(place), statistics_of(of_place)) for place, of_place in groups]
+    return "\n".join([STATISTICS_HEAD, "|---" * (STATISTICS_HEAD.count("|") - 1) + "|", *rows]) + "\n"
+
+
 ROUGH_HEAD = """# Walls as they are
 
 Made by `python -m tools.place_campaign --rough --only {places} --sessions {sessions}`, so many sessions of each
@@ -77,8 +86,8 @@ A false face is left out of the adjustment, or the faces are in doubt and the se
 footing, a fender's end or splash are left out besides. Where nothing else shows what a face shows, it cannot be tested:
 "told" are the sessions with the warning that a wall may be off unnoticed, and what it would do to the mount. The plan
 is that of the session's passes at the found faces but for the false one, with the walls' true roughness
-(`as_built.roughness_m`). Growth of one thickness on all walls looks like a lever arm: no test shows it, and
-`as_built.growth_sigma_m` (1.5 cm) has it in the sigmas.
+(`as_built.roughness_m`), and masks where the footing, the fenders and the ladder stand. Growth of one thickness on all
+walls looks like a lever arm: no test shows it, and `as_built.growth_sigma_m` (1.5 cm) has it in the sigmas.
 """
 
 
