@@ -7,7 +7,7 @@ covariances, the products L₁⁻¹ e₁ (L₂⁻¹ e₂)ᵀ of the errors have 
 mean of ⟨product, K⟩ / ⟨K, K⟩, 1 if C₁₂ is true, 0 if the heads were independent; the largest of the 36 deviations of
 the mean products from K is given in standard errors. Random covariances are judged: no systematic error is drawn.
 
-    python -m tools.two_heads [--sessions 200] [--only KIND] [--jobs 2] [--resume]
+    python -m tools.two_heads [--sessions 200] [--first 0] [--only KIND] [--jobs 2] [--resume]
 """
 
 import argparse
@@ -125,12 +125,13 @@ def main() -> None:
     """Simulate and calibrate the sessions, write their rows, and print a summary of each kind."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sessions", type=int, default=200, help="number of sessions of each kind; default: 200")
+    parser.add_argument("--first", type=int, default=0, help="number of the first session; default: 0")
     parser.add_argument("--only", choices=list(KINDS), help="one kind of session; default: all")
     parser.add_argument("--jobs", type=int, default=2, help="number of worker processes; default: 2")
     parser.add_argument("--resume", action="store_true", help="continue a campaign that was interrupted")
     options = parser.parse_args()
     for kind in [options.only] if options.only else KINDS:
-        tasks = [(kind, number) for number in range(options.sessions)]
+        tasks = [(kind, options.first + number) for number in range(options.sessions)]
         path = FOLDER / f"two_heads_{kind.replace(' ', '_')}.parquet"
         table = collect_rows(path, session_row, tasks, options.jobs, options.resume, TASKS_OF_A_WORKER)
         print(report(kind, table), flush=True)
