@@ -2,9 +2,8 @@
 
 Each session is simulated with all errors drawn by their sigmas (``tools.drawn_errors``), and calibrated twice: on the
 target that ``kind: found`` finds in the laser's points, and on the drawn one, with the same ``as_built``. Drawn faces
-that no found plane meets are ``seen: dry``, or left out below the water: soundings on them give what no finding can. So
-are those in a found plane whose soundings the first calibration left out, for others contradicted them: that is no
-matter of finding. Found planes that are not drawn, such as a wall behind the target, are struck.
+that no found plane meets are ``seen: dry``, or left out below the water: soundings on them give what no finding can.
+Found planes that are not drawn, such as a wall behind the target, are struck.
 
     python -m tools.found_and_drawn [--only dock ...] [--sessions 20] [--jobs 2] [--resume] > FILE.md
 """
@@ -12,7 +11,6 @@ matter of finding. Found planes that are not drawn, such as a wall behind the ta
 import argparse
 import json
 import tempfile
-from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -47,14 +45,15 @@ the laser's points; then the session is calibrated again on the drawn target, wi
 errors are drawn by their sigmas, as in [places](places.md). In the first columns the values on the found target less
 those on the drawn one, RMS in total sigmas of the former.
 
-| target | {names} | all | largest | total σ found ÷ drawn, largest | mean NSE found, drawn | a face left out |
+| target | {names} | all | largest | total σ found ÷ drawn, largest | mean NSE found, drawn | a face left out: largest |
 |---{rules}|---|---|---|---|---|
 """
 FOOT = """
 Of the drawn target the sonar sees the faces that are found: the wall and both returns of the dock, not its ledges; both
 sides of the caisson's corner, not the footing; of the patent's target the fronts of the blocks, and the wall between
 them. Found planes that are not drawn, such as the wall behind the patent's target, are struck. Last column: sessions
-in which the other faces contradicted the soundings on one, which then were left out, of the drawn target, too.
+in which the soundings on a found face were left out, because others contradicted them, and their largest difference. A
+drawn face is never left out: these sessions are not in the other columns.
 """
 
 
@@ -84,14 +83,13 @@ def row_of(task: Task) -> dict[str, Any]:
         poolcal(["target", session, "--depth", FOUND["depth_m"], "--out", folder / "place.yaml"], (0,))
         target = yaml.safe_load((folder / "place.yaml").read_text("utf-8"))["target"]
         settings = yaml.safe_load((session / "pool.yaml").read_text("utf-8"))["target"]
-        others = _same_faces(model, settings, target)[1]
-        calibration = _calibrated(folder, "found", {"target": FOUND | {"strike": others}})
-        left_out = {one["family"] for one in calibration.get("left_out", []) if one["low_m"] is one["high_m"] is None}
-        drawn, _ = _same_faces(model, settings, target, left_out)
+        drawn, others = _same_faces(model, settings, target)
+        found = _calibrated(folder, "found", {"target": FOUND | {"strike": others}})
         other = _calibrated(folder, "drawn", {"target": drawn, "as_built": AS_BUILT.model_dump(mode="json")})
-        by_finding, by_drawing = (one["methods"]["adjustment"] for one in (calibration, other))
+        by_finding, by_drawing = (one["methods"]["adjustment"] for one in (found, other))
         truth = json.loads(Path(f"{session}.truth.json").read_text("utf-8"))
-    row |= {"faces": len(target["faces"]) - len(others), "drawn_faces": len(drawn["faces"]), "left": len(left_out)}
+    row |= {"faces": len(target["faces"]) - len(others), "drawn_faces": len(drawn["faces"])}
+    row["left"] = sum(one["low_m"] is one["high_m"] is None for one in found.get("left_out", []))
     row |= error_columns(by_finding, truth) | error_columns(by_drawing, truth, prefix="drawn_")
     mounts = [(np.array(one["R_body_from_mbes"]), np.array(one["lever_arm_m"])) for one in (by_drawing, by_finding)]
     apart = dict(zip(NAMES, mount_error(*mounts[1], *mounts[0]) / UNITS, strict=True))
@@ -108,12 +106,11 @@ def _calibrated(folder: Path, run: str, config: dict[str, Any]) -> dict[str, Any
 
 
 def _same_faces(
-    model: TargetModel, settings: dict[str, Any], found: dict[str, Any], left_out: Collection[str] = ()
+    model: TargetModel, settings: dict[str, Any], found: dict[str, Any]
 ) -> tuple[dict[str, Any], list[str]]:
     """Return the drawn target, of which the sonar sees the faces in found planes; those in one plane are related.
 
-    And the names of found planes in which no drawn face lies, such as that of a wall behind the target. ``left_out``:
-    found planes whose soundings do not count.
+    And the names of found planes in which no drawn face lies, such as that of a wall behind the target.
     """
     theirs, own = frame_of(found), frame_of(settings)
     seen: dict[str, str] = {}
@@ -130,8 +127,6 @@ def _same_faces(
         ]
         if not same:
             others.append(name)
-        if name in left_out:
-            continue
         seen |= {one.name: one.seen for one in same}
         if len(same) > 1:
             relations.append({"same_plane": [one.name for one in same]})
@@ -150,12 +145,15 @@ def _same_faces(
 def page(table: pd.DataFrame) -> str:
     """Return the page in Markdown."""
     lines = []
-    for kind, rows in table.groupby("place", sort=False):
+    for kind, every in table.groupby("place", sort=False):
+        rows = every[every["left"] == 0]
         apart = rows[[f"apart_{name}" for name in NAMES]].to_numpy(float)
         of_name = np.sqrt((apart**2).mean(axis=0))
         found, drawn = (rows[[f"{end}total_{name}" for name in NAMES]].to_numpy(float) for end in ("", "drawn_"))
         ratios = np.median(found / drawn, axis=0)
-        worst, left = int(np.argmax(ratios)), int((rows["left"] > 0).sum())
+        worst, out = int(np.argmax(ratios)), every[every["left"] > 0]
+        largest = np.abs(out[[f"apart_{name}" for name in NAMES]].to_numpy(float)).max(initial=0.0)
+        left = f"{len(out)}: {largest:.1f}" if len(out) else "0"
         lines.append(
             f"| {kind} | {' | '.join(f'{size:.2f}' for size in of_name)} | {np.sqrt((apart**2).mean()):.2f} | "
             f"{np.abs(apart).max():.1f} | {ratios[worst]:.2f} ({NAMES[worst]}) | "

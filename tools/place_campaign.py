@@ -154,7 +154,8 @@ def _as_it_is(found: dict[str, Any], scenario: dict[str, Any], fault: str) -> di
     true = {name: face for name, face in targets[0]["faces"].items() if drawn[name] != fault}
     for name in true:
         if drawn[name] == longest_wall(scenario["name"]):
-            true[name] |= {"masks": masks_of_things(rough["boxes"], scenario["name"], name, *targets)}
+            masks = masks_of_things(rough["boxes"], scenario["name"], name, *targets)
+            true[name] = true[name] | {"masks": [*true[name].get("masks", []), *masks]}
     return found | {"target": found["target"] | {"faces": true}, "as_built": found["as_built"] | stated}
 
 

@@ -114,10 +114,11 @@ def masks_of_things(
     for box in boxes:
         low, high = np.array(box["low_m"]), np.array(box["high_m"])
         ends = (low + high)[:2] / 2 + np.outer([-0.5, 0.5], (high - low)[1] * along)
-        points = np.column_stack([ends, np.zeros(2)])
-        span = np.sort(along_face(seen, frame_of(found).points_from_ecef(frame_of(drawn).points_to_ecef(points))))
+        points = frame_of(drawn).points_to_ecef(np.column_stack([ends, [low[2], high[2]]]))
+        there = frame_of(found).points_from_ecef(points)
         if box["name"] != "boat":
-            masks.append({"along_m": span.tolist(), "height_m": [box["low_m"][2], box["high_m"][2]]})
+            heights = there[:, 2] - found.get("water_level_m", 0.0)
+            masks.append({"along_m": np.sort(along_face(seen, there)).tolist(), "height_m": heights.tolist()})
     return masks
 
 

@@ -20,6 +20,9 @@ DEPTH_M = 4.0  # below the water, to which faces are continued unless another de
 DEPTHS_M = (0.5, 100.0)  # those that may be given
 
 
+Gaps = Literal["repeated", "seen", "none"]
+
+
 class Found(Model):
     """What is said of a target that is to be found: how deep its faces go on, which are struck, and masks by face."""
 
@@ -27,6 +30,7 @@ class Found(Model):
     depth_m: Annotated[float, Field(ge=DEPTHS_M[0], le=DEPTHS_M[1])] = DEPTH_M
     strike: tuple[FaceName, ...] = ()  # faces that are no wall below the water
     masks: dict[FaceName, Masks] = Field(default_factory=dict)  # parts of faces that do not count
+    gaps: Gaps = "repeated"  # between courses, that become masks: also below the water if they repeat, or none there
     water_by_time: WaterByTime | None = None  # null: the level stays
 
 

@@ -11,9 +11,10 @@ from pipeline.artefacts.streams import Mapper, serial
 from pipeline.errors import RawDataError
 from pipeline.finding.dry_plane import DryPlane
 from pipeline.finding.gaps import EMPTY, USUAL, dry_gaps
+from pipeline.finding.plane_cells import CORNERS, FEWEST, OFF_M, UNEVEN_M, cells_on
 from pipeline.finding.stacked_planes import with_stacks_joined
 from pipeline.maths.adjustment.profiles import NORMAL
-from pipeline.maths.surfaces.flatness import cells_of, flatness, of_one_surface, plane_axes
+from pipeline.maths.surfaces.flatness import cells_of, flatness, plane_axes
 from pipeline.maths.surfaces.growing import GrowthLimits, Plane, grown_regions, plane_of_voxels
 from pipeline.maths.surfaces.outline import area, convex_hull, inside, shrunk, simplified
 from pipeline.maths.surfaces.voxels import voxels_with_rows
@@ -22,15 +23,14 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 VOXEL_M, CELL_M = 0.3, 0.25
 CUT, SMOOTH_M = 3.0, 0.001  # of robust sigmas of the cells, and the least of these
-FEWEST, FEWEST_CELLS, REFITS = 4, 8, 5  # points of a cell, cells of a plane, fits of a plane to its cells
+FEWEST_CELLS, REFITS = 8, 5  # cells of a plane, fits of a plane to its cells
 GROWTH = GrowthLimits(thickness_m=0.03, distance_m=0.06, least_voxels=12)
-OFF_M = 0.15  # points of a plane's voxels farther off belong to something in front of it
 SAMPLE = 4000  # points of a plane that are kept for pictures, up to twice as many
-MARGIN_M, CORNERS = 0.1, 8  # of the outline: inside the outermost cells' means; most corners
+MARGIN_M = 0.1  # of the outline: inside the outermost cells' means
 EDGE_CELL_M, EDGE_MARGIN_M = 0.1, 0.05  # the same of the last outline, where the points are dense enough
 BEYOND_M = VOXEL_M + MARGIN_M  # so far outside the first outline the last one may lie
 WAVES_M, OF_HEIGHT = 0.3, 0.25  # above the lowest points: waves, splash, the water's echoes; at most this share
-LEAST_M, UNEVEN_M, BOW_M, COVERED = 1.0, 0.03, 0.03, 0.6  # extent; RMS; bow; share of cells seen, but for gaps
+LEAST_M, BOW_M, COVERED = 1.0, 0.03, 0.6  # extent; bow; share of the cells seen, but for gaps
 RISE_M, FEW_M2 = 0.4, 0.1  # least rise of its dry part; area of the densest plane with as many points as it needs
 NEAR_WATER_M = 0.5  # largest height of a plane's lower end above the water
 COLUMN_SPREAD_M, FEWEST_COLUMNS, FULL = 0.1, 6, 20  # columns of points that end at the water; points of a column
@@ -59,7 +59,9 @@ def dry_planes(points_m: Array, boat_m: Array, mapper: Mapper = serial) -> list[
     of_regions = [order[ends[k] : ends[k + 1]] for k in range(len(regions))]
     plane_of = partial(_plane, points_m, boat_m=boat_m)
     found = list(mapper(plane_of, of_regions, (plane_of_voxels(voxels, rows) for rows in regions)))
-    found = with_stacks_joined(found, of_regions, order[: ends[0]], points_m, plane_of)
+    level_m = _lowest_ends(found)
+    known_m = -np.inf if level_m is None else level_m
+    found = with_stacks_joined(found, of_regions, order[: ends[0]], points_m, known_m, plane_of)
     return _dense_enough(sorted(found, key=lambda plane: -plane.flat.width_m * plane.flat.height_m))
 
 
@@ -87,7 +89,7 @@ def _plane(all_m: Array, rows: Integers, grown: Plane | DryPlane, boat_m: Array)
     waves_m = float(lowest_m + min(WAVES_M, OF_HEIGHT * (highest_m - lowest_m)))
     dry_m = points_m[points_m[:, 2] > waves_m]
     for _ in range(REFITS):
-        cells_m, outline = _cells_on(dry_m, normal, distance_m, CELL_M, MARGIN_M)
+        cells_m, outline = cells_on(dry_m, normal, distance_m, CELL_M, MARGIN_M)
         used = cells_m[inside(outline, cells_m @ plane_axes(normal).T)]
         away = np.abs(used @ normal - distance_m)
         used = used[away <= CUT * max(NORMAL * float(np.median(away)) if len(away) else 0.0, SMOOTH_M)]
@@ -98,7 +100,7 @@ def _plane(all_m: Array, rows: Integers, grown: Plane | DryPlane, boat_m: Array)
         distance_m = float(normal @ mean)
     sense = 1.0 if normal @ boat_m > distance_m else -1.0
     normal, distance_m = sense * normal, sense * distance_m
-    _, outline = _cells_on(dry_m, normal, distance_m, CELL_M, MARGIN_M)
+    _, outline = cells_on(dry_m, normal, distance_m, CELL_M, MARGIN_M)
     on_m = all_m[(np.abs(all_m @ normal - distance_m) <= UNEVEN_M) & (all_m[:, 2] > waves_m)]
     outline = _near_the_edge(on_m, normal, outline)
     away = points_m @ normal - distance_m
@@ -106,7 +108,7 @@ def _plane(all_m: Array, rows: Integers, grown: Plane | DryPlane, boat_m: Array)
     in_plane, heights, away = points_m[on] @ plane_axes(normal).T, points_m[on, 2], away[on]
     within = inside(outline, in_plane)
     flat = flatness(in_plane[within], away[within], CELL_M)
-    cells_m, _ = _cells_on(points_m, normal, distance_m, CELL_M, MARGIN_M)
+    cells_m, _ = cells_on(points_m, normal, distance_m, CELL_M, MARGIN_M)
     if len(cells_m):  # the extent is that of all cells, the rest is judged within the outline
         width, height = (np.ptp(cells_m @ plane_axes(normal).T, axis=0) + CELL_M).tolist()
         flat = replace(flat, width_m=width, height_m=height)
@@ -145,25 +147,6 @@ def _near_the_edge(on_m: Array, normal: Array, coarse: Array) -> Array:
     return simplified(shrunk(convex_hull(in_plane[outermost[inverse]]), EDGE_MARGIN_M), CORNERS)
 
 
-def _cells_on(
-    points_m: Array, normal: Array, distance_m: float, cell_m: float, margin_m: float
-) -> tuple[Array, Array]:
-    """Return the means (c, 3) of the points in each cell of a plane that lie on it, and their outline (k, 2).
-
-    Single points far out make no cell.
-    """
-    away, axes = points_m @ normal - distance_m, plane_axes(normal)
-    near = np.abs(away) <= OFF_M
-    points, away = points_m[near], away[near]
-    _, inverse, count = cells_of(points @ axes.T, cell_m)
-    sums = np.array([np.bincount(inverse, weights=axis, minlength=len(count)) for axis in (*points.T, away, away**2)])
-    full = count >= FEWEST
-    of_cells = (sums[:, full] / count[full]).T
-    means, off, squares = of_cells[:, :3], of_cells[:, 3], of_cells[:, 4]
-    means = means[(np.abs(off) <= UNEVEN_M) & of_one_surface(off, squares)]
-    return means, simplified(shrunk(convex_hull(means @ axes.T), margin_m), CORNERS)
-
-
 def _column_ends(along_m: Array, heights_m: Array) -> Array:
     """Return the height (c,) of the lowest points of each column of a cell's width that has points enough."""
     column = np.floor(along_m / CELL_M).astype(np.int64)
@@ -193,22 +176,25 @@ def _refusal(plane: DryPlane) -> str:
 
 
 def water_level_m(planes: Sequence[DryPlane]) -> float:
-    """Return the height at which the planes' points end: the middle of the densest ends of their columns.
-
-    Walls that end higher (on piles, behind a fender) end at other heights, and are fewer.
-
-    Raises
-    ------
-    RawDataError
-        Too few columns end at one height.
-    """
-    ends = np.sort(np.concatenate([plane.column_ends_m for plane in planes if not plane.refused] or [np.empty(0)]))
-    within = np.searchsorted(ends, ends + COLUMN_SPREAD_M, "right") - np.arange(len(ends))
-    if not len(ends) or within.max() < FEWEST_COLUMNS:
+    """Return the height at which the planes' points end; an error if too few of their columns end at one height."""
+    level_m = _lowest_ends(planes)
+    if level_m is None:
         raise RawDataError(
             "laser: no wall or slope whose points end at one height, the water's; pass nearer to a wall, so that the "
             "laser sees it down to the water"
         )
+    return level_m
+
+
+def _lowest_ends(planes: Sequence[DryPlane]) -> float | None:
+    """Return the middle of the densest ends of the planes' columns; None if too few end at one height.
+
+    Walls that end higher (on piles, behind a fender) end at other heights, and are fewer.
+    """
+    ends = np.sort(np.concatenate([plane.column_ends_m for plane in planes if not plane.refused] or [np.empty(0)]))
+    within = np.searchsorted(ends, ends + COLUMN_SPREAD_M, "right") - np.arange(len(ends))
+    if not len(ends) or within.max() < FEWEST_COLUMNS:
+        return None
     first = int(np.argmax(within))
     return float(np.median(ends[first : first + within[first]]))
 
@@ -220,5 +206,7 @@ def reaching_water(planes: Sequence[DryPlane], level_m: float) -> list[DryPlane]
         above = plane.lowest_m - level_m
         if not plane.refused and above > NEAR_WATER_M:
             plane = replace(plane, refused=f"ends {above:.1f} m above the water")
+        elif not plane.refused and plane.corners_m(plane.outline_m)[:, 2].max() < level_m + WAVES_M:
+            plane = replace(plane, refused="lies below the water: a mirror image")
         found.append(plane)
     return found

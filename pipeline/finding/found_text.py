@@ -38,13 +38,13 @@ def remarks(place: FoundPlace) -> list[str]:
 
 def _of_gaps(face: FoundFace) -> str:
     """Return the sentence of a face's gaps."""
-    gaps = ", ".join(f"{low:.2f}–{high:.2f}" for low, high in face.gaps_m[face.gaps_m[:, 0] > 0])
-    if np.any(face.gaps_m[:, 1] <= 0):
+    gaps = ", ".join(f"{low:.2f} – {high:.2f}" for low, high in face.gaps_m)
+    if len(face.below_m):
         return (
-            f"{face.name} has gaps at {gaps} m above the water; they repeat, and are taken to go on below it: "
-            "no point in them counts."
+            f"{face.name} has gaps at {gaps} m above the water, which repeat: points at these heights are not used, "
+            "nor soundings where the gaps would go on below the water."
         )
-    return f"{face.name} has gaps at {gaps} m above the water: no point in them counts."
+    return f"{face.name} has gaps at {gaps} m above the water: points at these heights are not used."
 
 
 def too_few(place: FoundPlace) -> list[str]:

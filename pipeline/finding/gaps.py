@@ -1,8 +1,8 @@
 """Gaps of a wall: heights at which hardly any of its points lie, as between courses of blocks or of planks.
 
 Behind a gap lie ledges, whose points begin at the wall's plane and would turn it. So gaps become masks of the face.
-Gaps of one height that follow each other at one distance belong to the building, and are taken to go on below the
-water: if they do not, soundings are lost, and nothing else.
+Gaps of one height that follow each other at one distance, down to where the wall was seen, belong to the building, and
+are taken to go on below the water: if they do not, soundings are lost, and nothing else.
 """
 
 from itertools import pairwise
@@ -11,14 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-FINEST_M, COARSEST_M = 0.02, 0.16  # heights of the bins
+FINEST_M, COARSEST_M = 0.02, 0.04  # heights of the bins: coarser ones could not say where a gap ends
 USUAL = 0.75  # quantile of the bins' points: up to three quarters of a wall may be gaps
 FULL = 20  # points of a usual bin: with fewer the bins must be higher
 EMPTY = 0.1  # of the points of a usual bin: a bin with fewer belongs to a gap
-LEAST_M = 0.1  # a lower gap is none: less than the margin that soundings keep from both its ends
+LEAST_M = 0.2  # a lower gap is none: on a far wall in calm water the scanner's lines may be as far apart
 ALIKE_M = 0.04  # largest difference of gaps of one height, and of their places from a regular row
 FURTHER_M = 0.005  # by which the place of a gap is less certain with each repeat
-MOST = 60  # gaps of a face
+COURSE_M = 0.1  # least height of a course between two gaps that nobody has seen
+MOST = 30  # gaps of a face that were seen, and that were not
 
 
 def dry_gaps(heights_m: Array) -> Array:
@@ -42,25 +43,37 @@ def dry_gaps(heights_m: Array) -> Array:
         bin_m *= 2
     full = np.flatnonzero(counts >= EMPTY * usual)  # a bin at an end is half full in the mean
     ends = [(low + bin_m * (below + 0.5), low + bin_m * (above + 0.5)) for below, above in pairwise(full.tolist())]
-    return np.array([end for end in ends if end[1] - end[0] >= LEAST_M + bin_m / 2]).reshape(-1, 2)
+    return np.array([end for end in ends if end[1] - end[0] >= LEAST_M]).reshape(-1, 2)[:MOST]
 
 
-def continued_gaps(gaps_m: Array, lowest_m: float) -> Array:
-    """Return gaps (k, 2), from below; if they repeat, also those that follow below them, down to a height.
+def gaps_below(gaps_m: Array, seen_m: float, lowest_m: float) -> Array:
+    """Return the gaps (k, 2) that follow below those that were seen (n, 2), if these repeat down to the lowest points.
 
-    Nobody has seen these: each is a little higher than the one above it.
+    Nobody has seen them: each is a little higher than the one above it.
 
-    >>> continued_gaps(np.array([[0.5, 1.0], [1.5, 2.0]]), -1.0).round(2).tolist()
-    [[-0.5, 0.0], [0.5, 1.0], [1.5, 2.0]]
+    Parameters
+    ----------
+    gaps_m : (n, 2) array
+        Gaps that were seen, from below.
+    seen_m : float
+        Height of the wall's lowest points: the next gap must reach below it.
+    lowest_m : float
+        Height at which the face ends.
+
+    >>> gaps_below(np.array([[0.5, 1.0], [1.5, 2.0]]), 0.0, -1.0).round(2).tolist()
+    [[-0.5, 0.0]]
+    >>> gaps_below(np.array([[1.5, 2.0], [2.5, 3.0]]), 0.0, -1.0).tolist()  # the wall is whole from 0.0 to 1.5 m
+    []
     """
+    none = np.empty((0, 2))
     if len(gaps_m) < 2:
-        return gaps_m
+        return none
     places, heights = gaps_m.mean(axis=1), np.diff(gaps_m, axis=1)[:, 0]
     period = float((places[-1] - places[0]) / (len(gaps_m) - 1))
     off = places - places[0] - period * np.arange(len(gaps_m))
-    if np.ptp(heights) > ALIKE_M or np.abs(off).max() > ALIKE_M:
-        return gaps_m
-    count = min(int(np.ceil((gaps_m[0, 1] - lowest_m) / period)) - 1, MOST - len(gaps_m))
-    repeats = np.arange(max(count, 0), 0, -1)[:, None]
-    below = gaps_m[0] - repeats * period + FURTHER_M * repeats * np.array([-1.0, 1.0])
-    return np.concatenate([below, gaps_m])
+    if np.ptp(heights) > ALIKE_M or np.abs(off).max() > ALIKE_M or gaps_m[0, 0] - period > seen_m + ALIKE_M:
+        return none
+    down = int(np.ceil((gaps_m[0, 1] - lowest_m) / period)) - 1
+    thin = int((period - float(heights.mean()) - COURSE_M) / (2 * FURTHER_M))
+    repeats = np.arange(max(min(down, thin, MOST), 0), 0, -1)[:, None]
+    return np.asarray(gaps_m[0] - repeats * period + FURTHER_M * repeats * np.array([-1.0, 1.0]))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pipeline.errors import RawDataError
 from pipeline.finding.dry_plane import DryPlane
-from pipeline.finding.gaps import continued_gaps
+from pipeline.finding.gaps import gaps_below
 from pipeline.maths.geometry.geodesy import PoolFrame, geodetic_from_ecef
 from pipeline.maths.surfaces.flatness import plane_axes
 from pipeline.maths.surfaces.outline import bent, clipped, convex_hull
@@ -28,7 +28,7 @@ class FoundFace:
     """A face: its name, and its corners (k, 3), counter-clockwise as the boat sees them, target frame.
 
     continued_m (k, 2): the same along the axes of its plane; gaps_m (k, 2): heights above the water, lower and upper
-    end, at which no point counts.
+    end, between which no points lie; below_m (k, 2): of further gaps, below the water, that nobody has seen.
     """
 
     name: str
@@ -36,6 +36,7 @@ class FoundFace:
     plane: DryPlane
     continued_m: Array
     gaps_m: Array
+    below_m: Array
 
 
 @dataclass(frozen=True)
@@ -143,7 +144,8 @@ def _named(
     for plane, corners, continued in sorted(faces, key=lambda face: float(face[1][:, 1].mean())):
         kind = "wall" if abs(plane.tilt_deg - 90) < UPRIGHT_DEG else "slope"
         counts[kind] += 1
-        gaps = plane.gaps_m if kind == "wall" else np.empty((0, 2))  # a slope's gaps have no one height
-        gaps = np.round(continued_gaps(gaps - level_m, -depth_m), DIGITS) + 0.0
-        named.append(FoundFace(f"{kind}-{counts[kind]}", corners, plane, continued, gaps))
+        gaps = plane.gaps_m - level_m if kind == "wall" else np.empty((0, 2))  # a slope's gaps have no one height
+        below = gaps_below(gaps, plane.lowest_m - level_m, -depth_m)
+        of_gaps = (np.round(heights, DIGITS) + 0.0 for heights in (gaps, below))  # no -0.0
+        named.append(FoundFace(f"{kind}-{counts[kind]}", corners, plane, continued, *of_gaps))
     return tuple(named)

@@ -6,6 +6,7 @@ from typing import Any, TypeVar
 import numpy as np
 import yaml
 
+from pipeline.config.found import Gaps
 from pipeline.config.pool import PoolConfig
 from pipeline.finding.bottom import BottomPiece
 from pipeline.finding.place import DIGITS, FoundPlace
@@ -24,8 +25,8 @@ as_built:                       # of walls below the water that nobody has surve
 """
 
 
-def pool_yaml(place: FoundPlace) -> str:
-    """Return the text of a pool's config with this target."""
+def pool_yaml(place: FoundPlace, gaps: Gaps = "repeated") -> str:
+    """Return the text of a pool's config with this target; ``gaps``: which become masks."""
     lines = [
         FIRST,
         "# a fender, a ladder, a moored boat. Below the water each goes on as above: the soundings test that.",
@@ -41,8 +42,10 @@ def pool_yaml(place: FoundPlace) -> str:
     for face in place.faces:
         rows = np.round(face.corners_m, DIGITS) + 0.0  # no -0.0
         corners = ", ".join("[" + ", ".join(f"{value:.{DIGITS}f}" for value in row) + "]" for row in rows)
-        gaps = ", ".join(f"{{height_m: [{low:.{DIGITS}f}, {high:.{DIGITS}f}]}}" for low, high in face.gaps_m)
-        lines.append(f"    {face.name}: {{corners: [{corners}]" + (f", masks: [{gaps}]}}" if gaps else "}"))
+        kinds = {"repeated": (face.below_m, face.gaps_m), "seen": (face.gaps_m,), "none": ()}[gaps]
+        heights = [f"{{height_m: [{low:.{DIGITS}f}, {high:.{DIGITS}f}]}}" for kind in kinds for low, high in kind]
+        masks = f", masks: [{', '.join(heights)}]" if heights else ""
+        lines.append(f"    {face.name}: {{corners: [{corners}]{masks}}}")
     return "\n".join(lines) + "\n" + AS_BUILT
 
 

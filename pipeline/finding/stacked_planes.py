@@ -1,11 +1,11 @@
 """Planes of the cloud that are one wall, one above the other: gaps between blocks, a pipe or a walkway part them.
 
 Regions grow from voxel to voxel and end at a gap. The part above it ends above the water, or is too small, and the part
-below it may be too low; together they serve, and the plane is that of a higher wall. They are joined if the plane of
-both together passes through the middle of each, and serves. A course of blocks not much higher than a voxel makes no
-region; its points join the plane in which they lie. What is far less dense than the plane does not join: water mirrors
-walls. Planes beside each other are not joined: above the water they lie in one plane, but below it each has its own
-errors.
+below it may be too low; together they make a higher wall. They are joined to a part that serves alone, if the plane of
+both together serves, and each part lies in it from end to end: what is set back would lean the plane. A course of
+blocks not much higher than a voxel makes no region; its points join the plane in which they lie. What lies below the
+water, or is far less dense than the plane, does not join: water mirrors walls. Planes beside each other are not joined:
+above the water they lie in one plane, but below it each has its own errors.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from pipeline.finding.dry_plane import DryPlane
 from pipeline.finding.gaps import EMPTY, USUAL
+from pipeline.finding.plane_cells import cells_on
 from pipeline.maths.surfaces.flatness import plane_axes
 from pipeline.maths.surfaces.outline import area
 
@@ -23,10 +24,14 @@ Integers = NDArray[np.int64]
 GAP_M = 2.0  # largest difference of height between the upper end of one and the lower end of the next
 SHARED = 0.5  # of the width of the narrower one: least part in which both stand
 NEAR_M = 0.05  # largest distance of the smaller one's corners from the larger one's plane
-SAME_M = 0.01  # largest distance of either one's middle from the plane of both
+SAME_M = 0.004  # largest distance of each part's own plane from that of both, over its cells
+CELL_M, FEWEST_CELLS = 0.25, 3  # side of a cell; cells of a part
 DENSE = 0.3  # of the plane's points to each area, or height: least that what joins it must have
+LEAST_M2 = 0.01  # an outline of less area is none
 ON_M = 0.03  # largest distance of a course's points from the plane
 COURSE_M = 0.1  # heights in which a course's points are counted
+MOST_FAILED = 8  # parts that do not join: with more no further ones are tried, for each takes all points
+BELOW_M = 0.3  # a part that reaches so far below the water is an image
 
 
 def with_stacks_joined(
@@ -34,6 +39,7 @@ def with_stacks_joined(
     rows: Sequence[Integers],
     free: Integers,
     points_m: Array,
+    level_m: float,
     plane_of: Callable[[Integers, DryPlane], DryPlane],
 ) -> list[DryPlane]:
     """Return the planes, those that are one wall as one.
@@ -48,43 +54,48 @@ def with_stacks_joined(
         Rows of the points that lie in none.
     points_m : (m, 3) array
         All points.
+    level_m : float
+        Height of the water, as far as it is known: -inf if not.
     plane_of : callable
         Makes the plane of the points of some rows, given about where it lies.
     """
     left = sorted(range(len(planes)), key=lambda k: (-planes[k].points, k))
-    thin = [rows[k] for k in left if len(planes[k].outline_m) < 3]  # lower or narrower than its margins
+    thin = [rows[k] for k in left if not _has_outline(planes[k])]  # lower or narrower than its margins
     free = np.sort(np.concatenate([free, *thin]))
+    free = free[points_m[free, 2] > level_m]
     found, free_m, taken = [], points_m[free], np.zeros(len(points_m), dtype=bool)
     while left:
         first = left.pop(0)
         plane, points = planes[first], rows[first]
-        if taken[points].any():
+        if taken[points].mean() > 0.5:
             continue  # a course of another plane
-        courses = free[in_courses(plane, points_m[points], free_m)]
+        if plane.refused:  # a part that cannot serve alone does not say how others lean
+            found.append(plane)
+            continue
+        courses = free[in_courses(plane, points_m[points], free_m) & ~taken[free]]
         if len(courses):
             joined = plane_of(np.concatenate([points, courses]), plane)
-            if is_one(joined, (plane,)):
+            if all(lies_in(joined, points_m[part]) for part in (points, courses)):
                 plane, points = joined, np.concatenate([points, courses])
                 taken[courses] = True
-        while True:
-            for other in left:
+        failed = set[int]()
+        for _ in range(2):  # what is too far from the first may be near enough to both
+            for other in list(left):
+                if planes[other].lowest_m <= level_m - BELOW_M or other in failed or len(failed) >= MOST_FAILED:
+                    continue
                 if may_be_one(plane, planes[other]):
-                    together = np.concatenate([points, rows[other]])
-                    joined = plane_of(together, plane)
-                    if is_one(joined, (plane, planes[other])):
-                        plane, points = joined, together
+                    joined = plane_of(np.concatenate([points, rows[other]]), plane)
+                    if all(lies_in(joined, points_m[part]) for part in (points, rows[other])):
+                        plane, points = joined, np.concatenate([points, rows[other]])
                         left.remove(other)
-                        break
-            else:
-                break
+                    else:
+                        failed.add(other)
         found.append(plane)
     return found
 
 
 def in_courses(plane: DryPlane, own_m: Array, free_m: Array) -> NDArray[np.bool_]:
     """Return which points (k,) of no plane are courses of a wall over or under its own points, or in their gaps."""
-    if plane.level or len(plane.outline_m) < 3 or not len(own_m):
-        return np.zeros(len(free_m), dtype=bool)
     along, ends = free_m @ plane_axes(plane.normal)[0], plane.outline_m[:, 0]
     on = (np.abs(free_m @ plane.normal - plane.distance_m) <= ON_M) & (along >= ends.min()) & (along <= ends.max())
     low = own_m[:, 2].min() - GAP_M
@@ -99,7 +110,7 @@ def in_courses(plane: DryPlane, own_m: Array, free_m: Array) -> NDArray[np.bool_
 
 def may_be_one(larger: DryPlane, smaller: DryPlane) -> bool:
     """Return whether a plane stands over or under a larger one, in about its plane."""
-    if larger.level or smaller.level or min(len(larger.outline_m), len(smaller.outline_m)) < 3:
+    if smaller.level or not (_has_outline(larger) and _has_outline(smaller)):
         return False
     dense = [plane.points / area(plane.outline_m) for plane in (larger, smaller)]
     if dense[1] < DENSE * dense[0]:
@@ -114,7 +125,15 @@ def may_be_one(larger: DryPlane, smaller: DryPlane) -> bool:
     return bool(shared >= SHARED * min(np.ptp(along), np.ptp(of_larger)) and gap <= GAP_M)
 
 
-def is_one(joined: DryPlane, parts: Sequence[DryPlane]) -> bool:
-    """Return whether the plane of some planes' points serves, and passes through the middle of each of them."""
-    middles = (part.corners_m(part.middle_m[None])[0] for part in parts)
-    return not joined.refused and all(abs(one @ joined.normal - joined.distance_m) <= SAME_M for one in middles)
+def lies_in(plane: DryPlane, points_m: Array) -> bool:
+    """Return whether a plane serves, and a part of it, by its points (n, 3), lies in it from end to end."""
+    cells_m, _ = cells_on(points_m, plane.normal, plane.distance_m, CELL_M, 0.0)
+    if plane.refused or len(cells_m) < FEWEST_CELLS:
+        return False
+    design = np.column_stack([np.ones(len(cells_m)), (cells_m - cells_m.mean(axis=0)) @ plane_axes(plane.normal).T])
+    off_m = design @ np.linalg.lstsq(design, cells_m @ plane.normal - plane.distance_m, rcond=None)[0]
+    return bool(np.abs(off_m).max() <= SAME_M)
+
+
+def _has_outline(plane: DryPlane) -> bool:
+    return len(plane.outline_m) >= 3 and area(plane.outline_m) >= LEAST_M2

@@ -37,7 +37,8 @@ def place_in(session_folder: Path, session: SessionConfig, depth_m: float, worke
 
 def found_target(session_folder: Path, session: SessionConfig, wanted: Found, workers: Workers) -> Mapping[str, Any]:
     """Return the content of a pool's file with that target."""
-    found: Mapping[str, Any] = yaml.safe_load(pool_yaml(place_in(session_folder, session, wanted.depth_m, workers)))
+    place = place_in(session_folder, session, wanted.depth_m, workers)
+    found: Mapping[str, Any] = yaml.safe_load(pool_yaml(place, wanted.gaps))
     return found
 
 
@@ -69,6 +70,7 @@ def remembered_target(
             "raw": [raw_digests(digests, session_folder, name, getattr(session, name)) for name in ("ins", "laser")],
             "settings": [one.model_dump(mode="json") for one in (session.ins, session.laser)],
             "depth_m": wanted.depth_m,
+            "gaps": wanted.gaps,
             "source": provenance.digests_of(*FINDS),
             "libraries": provenance.library_versions(),
         }

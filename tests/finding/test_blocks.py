@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import yaml
 
-from pipeline.config.found import Found, with_found
+from pipeline.config.found import Found, Gaps, with_found
 from pipeline.finding.found_text import table_text
 from pipeline.finding.place import FoundPlace
 from pipeline.finding.pool_file import pool_yaml
@@ -26,7 +26,7 @@ def sides(place: FoundPlace) -> dict[str, np.ndarray]:
     for face in place.faces:
         slanted = min((1, 3), key=lambda eighth: abs(np.dot(face.plane.normal[:2], _toward(eighth)) - 1))
         if np.dot(face.plane.normal[:2], _toward(slanted)) > 0.99:
-            found["P1" if slanted == 3 else "P3"] = face.gaps_m + place.height_m - 12.0
+            found["P1" if slanted == 3 else "P3"] = np.concatenate([face.below_m, face.gaps_m]) + place.height_m - 12.0
     return found
 
 
@@ -54,7 +54,7 @@ def test_the_wall_between_them_has_none(place: FoundPlace) -> None:
 
 
 def test_they_are_said_and_become_masks_beside_those_of_the_config(place: FoundPlace) -> None:
-    assert table_text(place).count("they repeat, and are taken to go on below it") == 2
+    assert table_text(place).count("m above the water, which repeat") == 2
     (name, *_) = [face.name for face in place.faces if len(face.gaps_m)]
     own = {"along_m": [0.0, 0.3], "height_m": [1.0, 1.2]}
 
@@ -67,3 +67,10 @@ def test_they_are_said_and_become_masks_beside_those_of_the_config(place: FoundP
     assert masks[-1] == own
     assert len(masks) > 5
     assert all(set(one) == {"height_m"} for one in masks[:-1])
+
+
+@pytest.mark.parametrize(("gaps", "number"), [("repeated", 7), ("seen", 3), ("none", 0)])
+def test_which_become_masks_can_be_said(place: FoundPlace, gaps: Gaps, number: int) -> None:
+    faces = yaml.safe_load(pool_yaml(place, gaps))["target"]["faces"]
+    (side,) = [face for face in place.faces if face.plane.normal[0] < 0 and face.plane.normal[1] < -0.5]
+    assert len(faces[side.name].get("masks", [])) == number

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.finding.gaps import ALIKE_M, EMPTY, FULL, LEAST_M, MOST, continued_gaps, dry_gaps
+from pipeline.finding.gaps import ALIKE_M, COARSEST_M, EMPTY, FULL, LEAST_M, MOST, dry_gaps, gaps_below
 
 Array = np.ndarray
 
@@ -23,7 +23,7 @@ def test_a_plain_wall_has_no_gaps() -> None:
     assert len(dry_gaps(courses([(0.0, 3.0)]))) == 0
 
 
-@pytest.mark.parametrize(("gap_m", "found"), [(LEAST_M + 0.06, 1), (LEAST_M - 0.04, 0)])
+@pytest.mark.parametrize(("gap_m", "found"), [(LEAST_M + 0.06, 1), (LEAST_M - 0.06, 0)])
 def test_a_joint_is_no_gap(gap_m: float, found: int) -> None:
     assert len(dry_gaps(courses([(0.0, 1.0), (1.0 + gap_m, 2.0)]))) == found
 
@@ -34,19 +34,37 @@ def test_a_few_points_of_what_stands_behind_fill_no_gap(share: float, found: int
     assert len(dry_gaps(np.concatenate([courses([(0.0, 1.0), (1.5, 2.5)]), behind]))) == found
 
 
-@pytest.mark.parametrize(("per_m", "found"), [(2 * FULL / 0.16, 1), (0.5 * FULL / 0.16, 0)])
+@pytest.mark.parametrize(("per_m", "found"), [(2 * FULL / COARSEST_M, 1), (0.5 * FULL / COARSEST_M, 0)])
 def test_few_points_show_no_gaps(per_m: float, found: int) -> None:
-    """With bins of 0.16 m a usual one has 40 points, or 10."""
+    """With the highest bins, of 4 cm, a usual one has 40 points, or 10."""
     assert len(dry_gaps(courses([(0.0, 1.0), (2.0, 3.0)], round(per_m)))) == found
+
+
+def test_a_face_has_a_bounded_number_of_gaps() -> None:
+    rail = [(0.5 * k, 0.5 * k + 0.25) for k in range(MOST + 10)]
+    assert len(dry_gaps(courses(rail))) == MOST
+    assert len(gaps_below(np.array([[0.4, 0.7], [1.4, 1.7]]), 0.0, -200.0)) == MOST
+
+
+GAPS = np.array([[0.4, 0.9], [1.4, 1.9], [2.4, 2.9]])
 
 
 def test_regular_gaps_go_on_to_the_lowest_height() -> None:
     """One metre apart: those that end above -2.6 m. Each is 1 cm higher than the last, about the same middle."""
-    gaps = np.array([[0.4, 0.9], [1.4, 1.9], [2.4, 2.9]])
-    below = continued_gaps(gaps, -2.6)[:-3]
+    below = gaps_below(GAPS, 0.0, -2.6)
     np.testing.assert_allclose(below.mean(axis=1), [-2.35, -1.35, -0.35])
     np.testing.assert_allclose(np.diff(below, axis=1)[:, 0], [0.53, 0.52, 0.51])
-    np.testing.assert_array_equal(continued_gaps(gaps, -2.6)[-3:], gaps)
+
+
+@pytest.mark.parametrize(("seen_m", "number"), [(-0.6 - 2 * ALIKE_M, 0), (-0.6, 3)])
+def test_they_go_on_only_if_they_reach_to_the_lowest_points(seen_m: float, number: int) -> None:
+    """The next gap would begin at -0.6 m: where the wall is seen below it, it is whole there."""
+    assert len(gaps_below(GAPS, seen_m, -2.6)) == number
+
+
+def test_they_go_on_while_a_course_is_left_between_them() -> None:
+    """Of 14 cm between gaps of 0.3 m, 1 cm goes with each repeat."""
+    assert len(gaps_below(np.array([[0.4, 0.7], [0.84, 1.14]]), 0.3, -20.0)) == 4
 
 
 @pytest.mark.parametrize(
@@ -60,8 +78,4 @@ def test_regular_gaps_go_on_to_the_lowest_height() -> None:
 )
 def test_others_do_not(gaps: list[list[float]]) -> None:
     """One alone, two of different height, three at different distances, none."""
-    np.testing.assert_array_equal(continued_gaps(np.array(gaps), -4.0), gaps)
-
-
-def test_a_face_has_a_bounded_number_of_gaps() -> None:
-    assert len(continued_gaps(np.array([[0.4, 0.6], [0.8, 1.0]]), -100.0)) == MOST
+    assert len(gaps_below(np.array(gaps), 0.0, -4.0)) == 0

@@ -27,9 +27,8 @@ COUNTED = 1_000_000  # cells, with points or without, that are counted however f
 class Flatness:
     """width_m, height_m: extent along the first and the second axis of the cells' points; uneven_m: RMS of their means.
 
-    bow_m: height that the second order reaches, 0 with few cells; both by cells that see one surface, and do not have
-    few points beside the others, as at the edge of what stands behind. covered: cells with points, as a share of those
-    within the extent.
+    bow_m: height that the second order reaches, 0 with few cells; both without cells that have far fewer points than
+    the others, as at the edge of what stands behind; covered: cells with points, as a share of those within the extent.
     """
 
     width_m: float
@@ -97,8 +96,8 @@ def flatness(in_plane_m: Array, away_m: Array, cell_m: float) -> Flatness:
         [np.bincount(inverse, weights=axis, minlength=len(keys)) for axis in (*in_plane_m.T, away_m)]
     )
     u, w, mean = totals[:, use] / count[use]
-    single = count[use] >= FEW * np.median(count[use])
-    place, mean = np.array([u, w])[:, single], mean[single]
+    usual = count[use] >= FEW * np.median(count[use])
+    place, mean = np.array([u, w])[:, usual], mean[usual]
     spans = np.ptp(keys[use], axis=0) + 1
     width, height = np.ptp(in_plane_m[use[inverse]], axis=0).tolist()
     plane = _design(place)[:, :3]

@@ -99,8 +99,10 @@ def _elevation(axes: Axes, face: FoundFace, place: FoundPlace) -> PathCollection
     axes.plot(*np.vstack([whole, whole[:1]]).T, color=INK, linewidth=0.8, linestyle=(0, (4, 3)))
     dry = _by_height(plane, plane.outline_m, place.level_m, middle)
     axes.plot(*np.vstack([dry, dry[:1]]).T, color=INK, linewidth=1.0)
-    for low, high in face.gaps_m:
-        axes.fill_between([whole[:, 0].min(), whole[:, 0].max()], low, high, color=QUIET, alpha=0.3, linewidth=0)
+    ends = [whole[:, 0].min(), whole[:, 0].max()]
+    for gaps, shade in ((face.gaps_m, 0.3), (face.below_m, 0.15)):
+        for low, high in gaps:
+            axes.fill_between(ends, low, high, color=QUIET, alpha=shade, linewidth=0)
     axes.axhline(0.0, color=LASER, linewidth=0.8)
     axes.set(title=face.name, xlabel="along, m", ylabel="above the water, m")
     axes.set_aspect("equal", adjustable="datalim")

@@ -152,6 +152,18 @@ def test_a_bow_is_its_height_and_a_turned_plane_has_none() -> None:
     assert flatness(place, away + 0.01 * u, 0.5).bow_m < 0.003
 
 
+@pytest.mark.parametrize(("share", "bent"), [(0.5, False), (2.0, True)])
+def test_a_few_points_of_what_stands_behind_bend_no_wall(share: float, bent: bool) -> None:
+    """The cell at one corner sees what stands 9 cm behind, with half a tenth of the usual points, or two tenths."""
+    rng, usual = np.random.default_rng(1), 400
+    place = rng.uniform(0.0, 1.0, (16 * usual, 2))
+    beyond = rng.uniform(0.0, 0.25, (round(share * 0.1 * usual), 2)) + np.array([1.0, 0.75])
+    away = np.concatenate([np.zeros(len(place)), np.full(len(beyond), -0.09)])
+    flat = flatness(np.concatenate([place, beyond]), away, 0.25)
+    assert (flat.bow_m > 0.01) == bent
+    assert (flat.uneven_m > 0.003) == bent
+
+
 def test_half_a_wall_is_half_covered() -> None:
     normal = np.array([-1.0, 0.0, 0.0])
     place, away = in_plane(wall(tuple(normal), 10.0, 4.0, 1), normal)
