@@ -148,7 +148,11 @@ def _as_it_is(found: dict[str, Any], scenario: dict[str, Any], fault: str) -> di
     """Return what was found, with the walls' roughness and masks of the things before them, without the false face."""
     rough = scenario["surroundings"]
     rms_m = float(np.hypot(rough["fouling_sigma_m"], rough["unevenness_m"]))
-    stated = {"roughness_m": rms_m, "roughness_length_m": rough["unevenness_length_m"]}
+    stated = {
+        "roughness_m": rms_m,
+        "dry_roughness_m": rough["unevenness_m"],
+        "roughness_length_m": rough["unevenness_length_m"],
+    }
     targets = found["target"], scenario["target"]
     drawn = {name: drawn_names([name], *targets)[0] for name in targets[0]["faces"]}
     true = {name: face for name, face in targets[0]["faces"].items() if drawn[name] != fault}

@@ -25,7 +25,8 @@ class AsBuilt(Model):
     bow_sigma_m: SigmaM = 0.001
     growth_sigma_m: SigmaM = 0.0  # of a layer of one thickness on all wet faces
     roughness_m: NotNegative = 0.0  # RMS of the wet faces about their planes: for poolcal plan, a run finds its own
-    roughness_length_m: Positive = 0.3  # over which it is alike
+    dry_roughness_m: NotNegative = 0.0  # the same of the dry faces
+    roughness_length_m: Positive = 0.3  # over which both are alike
 
     @model_validator(mode="after")
     def _growth_is_not_all(self) -> "AsBuilt":

@@ -165,21 +165,29 @@ def _normal(setting: PredictionSetting, passes: Sequence[PassSums], turn_s: floa
         for sensor, of_sensor in sums.items()
     }
     shares = {sensor: edge_shares(one, len(setting.state.surfaces)) for sensor, one in by_surface.items()}
-    added = _roughness(setting, rescaled(by_surface["mbes"], shares["mbes"]))
+    scaled = {sensor: rescaled(one, shares[sensor]) for sensor, one in by_surface.items()}
+    effects = {sensor: 1 + _roughness(setting, sensor, one) for sensor, one in scaled.items()}
     if single_faces:
-        by_face = {sensor: rescaled(one, shares[sensor][faces.surface]) for sensor, one in sums.items()}
-        by_face["mbes"] = with_design_effects(by_face["mbes"], DesignEffects(*[1 + added[faces.surface]] * 2))
+        by_face = {
+            sensor: with_design_effects(
+                rescaled(one, shares[sensor][faces.surface]), DesignEffects(*[effects[sensor][faces.surface]] * 2)
+            )
+            for sensor, one in sums.items()
+        }
         return equations_with_faces(Linearisation(by_face, setting.state, body, drift), faces, drift, noise).normal
-    by_surface = {sensor: rescaled(one, shares[sensor]) for sensor, one in by_surface.items()}
-    by_surface["mbes"] = with_design_effects(by_surface["mbes"], DesignEffects(1 + added, 1 + added))
+    by_surface = {
+        sensor: with_design_effects(one, DesignEffects(effects[sensor], effects[sensor]))
+        for sensor, one in scaled.items()
+    }
     return normal_equations(Linearisation(by_surface, setting.state, body, drift), drift, noise).normal
 
 
-def _roughness(setting: PredictionSetting, soundings: IntervalSums) -> Array:
-    """Return what the wet faces' roughness adds to the design effects (s,) of these passes' soundings."""
+def _roughness(setting: PredictionSetting, sensor: str, sums: IntervalSums) -> Array:
+    """Return what the faces' roughness adds to the design effects (s,) of a sensor's points in these passes."""
     weight = np.zeros(len(setting.state.surfaces))
-    np.add.at(weight, soundings.surface, soundings.normal[:, 0, 0])
-    return expected_roughness(weight, setting.wet_areas_m2(), setting.roughness_m, setting.roughness_length_m)
+    np.add.at(weight, sums.surface, sums.normal[:, 0, 0])
+    rms_m = setting.roughness_m if sensor == "mbes" else setting.dry_roughness_m
+    return expected_roughness(weight, setting.areas_m2(wet=sensor == "mbes"), rms_m, setting.roughness_length_m)
 
 
 def planned_track(setting: PredictionSetting, planned: Pass, number: int) -> Array:

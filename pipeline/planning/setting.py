@@ -16,7 +16,7 @@ from pipeline.mount import mount_of
 from pipeline.target.design import target_of
 
 BEYOND_M = 2.0  # from the last block to the end of a pass
-CELL_M = 0.1  # side of the cells by which a face's wet area is found
+CELL_M = 0.1  # side of the cells by which a face's area is found
 Array = NDArray[np.float64]
 
 
@@ -24,7 +24,8 @@ Array = NDArray[np.float64]
 class PredictionSetting:
     """Target and instruments, which are the same for all passes of a plan.
 
-    roughness_m, roughness_length_m: RMS of the wet faces about their planes, and the length over which it is alike.
+    roughness_m: RMS of the wet faces about their planes, dry_roughness_m: of the dry ones; roughness_length_m: the
+    length over which they are alike.
     """
 
     model: TargetModel
@@ -35,6 +36,7 @@ class PredictionSetting:
     laser: Laser
     mbes: Mbes
     roughness_m: float = 0.0
+    dry_roughness_m: float = 0.0
     roughness_length_m: float = 0.0
 
     @property
@@ -43,12 +45,12 @@ class PredictionSetting:
         low, high = self.model.bounds()
         return float(max(-low[1], high[1])) + BEYOND_M
 
-    def wet_areas_m2(self) -> Array:
-        """Return the area (s,) of each surface's faces under water."""
+    def areas_m2(self, *, wet: bool) -> Array:
+        """Return the area (s,) of each surface's faces under water, or above it."""
         areas, number = np.zeros(len(self.state.surfaces)), {s.family: k for k, s in enumerate(self.state.surfaces)}
         for face in self.model.faces:
             centres_m, cell_m2 = face.cells(CELL_M)
-            counts = centres_m[:, 2] < self.model.water_level_m
+            counts = (centres_m[:, 2] < self.model.water_level_m) == wet
             nothing = np.zeros(len(centres_m))
             counts &= outside_masks(face, along_face(face, centres_m), centres_m[:, 2], (nothing, nothing)) > 0
             areas[number[face.family]] += cell_m2 * np.sum(counts)
@@ -67,6 +69,7 @@ def setting_of(plan: Plan, pool: PoolConfig, session: SessionConfig) -> Predicti
         laser=session.laser,
         mbes=mbes,
         roughness_m=pool.as_built.roughness_m,
+        dry_roughness_m=pool.as_built.dry_roughness_m,
         roughness_length_m=pool.as_built.roughness_length_m,
     )
 
