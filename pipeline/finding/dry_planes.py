@@ -11,7 +11,7 @@ from pipeline.artefacts.streams import Mapper, serial
 from pipeline.errors import RawDataError
 from pipeline.finding.dry_plane import DryPlane
 from pipeline.finding.gaps import EMPTY, USUAL, dry_gaps
-from pipeline.finding.plane_cells import CORNERS, FEWEST, OFF_M, UNEVEN_M, cells_on
+from pipeline.finding.plane_cells import CELL_M, CORNERS, FEWEST, OFF_M, UNEVEN_M, cells_on
 from pipeline.finding.stacked_planes import with_stacks_joined
 from pipeline.maths.adjustment.profiles import NORMAL
 from pipeline.maths.surfaces.flatness import cells_of, flatness, plane_axes
@@ -21,7 +21,7 @@ from pipeline.maths.surfaces.voxels import voxels_with_rows
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-VOXEL_M, CELL_M = 0.3, 0.25
+VOXEL_M = 0.3
 CUT, SMOOTH_M = 3.0, 0.001  # of robust sigmas of the cells, and the least of these
 FEWEST_CELLS, REFITS = 8, 5  # cells of a plane, fits of a plane to its cells
 GROWTH = GrowthLimits(thickness_m=0.03, distance_m=0.06, least_voxels=12)

@@ -7,6 +7,7 @@ from pipeline.maths.surfaces.flatness import cells_of, of_one_surface, plane_axe
 from pipeline.maths.surfaces.outline import convex_hull, shrunk, simplified
 
 Array = NDArray[np.float64]
+CELL_M = 0.25  # side of a cell
 OFF_M = 0.15  # points farther off belong to something in front of the plane, or behind it
 UNEVEN_M = 0.03  # largest distance of a cell's mean from the plane
 FEWEST, CORNERS = 4, 8  # points of a cell; most corners of an outline

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pipeline.finding.dry_plane import DryPlane
 from pipeline.finding.gaps import EMPTY, USUAL
-from pipeline.finding.plane_cells import cells_on
+from pipeline.finding.plane_cells import CELL_M, cells_on
 from pipeline.maths.surfaces.flatness import plane_axes
 from pipeline.maths.surfaces.outline import area
 
@@ -25,7 +25,7 @@ GAP_M = 2.0  # largest difference of height between the upper end of one and the
 SHARED = 0.5  # of the width of the narrower one: least part in which both stand
 NEAR_M = 0.05  # largest distance of the smaller one's corners from the larger one's plane
 SAME_M = 0.004  # largest distance of each part's own plane from that of both, over its cells
-CELL_M, FEWEST_CELLS = 0.25, 3  # side of a cell; cells of a part
+FEWEST_CELLS = 3  # of a part
 DENSE = 0.3  # of the plane's points to each area, or height: least that what joins it must have
 LEAST_M2 = 0.01  # an outline of less area is none
 ON_M = 0.03  # largest distance of a course's points from the plane
