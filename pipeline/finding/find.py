@@ -14,7 +14,7 @@ from pipeline.maths.geometry.trajectory import Trajectory
 from pipeline.mount import mount_of
 
 TRACK = 2000  # places of the boat that are kept for pictures
-PROVISIONAL = 250_000  # points of the planes that the drift is taken from
+PROVISIONAL = 150_000  # points of the planes that the drift is taken from
 
 
 def find_place(ins: Stream, laser: Stream, session: SessionConfig, depth_m: float) -> FoundPlace:

@@ -1,8 +1,8 @@
 """A sample of the laser's points round the boat, placed by the INS, in one reading.
 
-A point is kept if the number that its time is scattered to lies below a limit, which falls by half whenever too many
-are kept. So the sample does not depend on how the files are divided or how many workers read them, all stretches of the
-session have their share, and the memory is the same for any session. Where the files say how many points they have, the
+A point is kept if the number that its time is scattered to lies below a limit, which falls by a tenth whenever too
+many are kept. So the sample does not depend on how the files are divided or how many workers read them, all stretches
+of the session have their share, and the memory is the same for any session. Where the files say how many points they have, the
 limit begins so low that not many more than are kept leave the reader. Points are placed when the sample is complete.
 """
 
@@ -28,8 +28,8 @@ from pipeline.readers.las import LasPart
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Columns = Mapping[str, NDArray[Any]]
-MOST = 750_000  # points of the sample
-DRAWN = 4 * MOST  # points that leave the reader, near the boat or not, if the files say how many there are
+MOST = 500_000  # points of the sample
+DRAWN = 2 * MOST  # points that leave the reader, near the boat or not, if the files say how many there are
 FARTHEST_M = 50.0  # of a point from the INS
 MAX_INTERVAL_NS = 100_000_000  # between two INS records, for a point between them to be placed
 EVERYWHERE = (np.full(3, -np.inf), np.full(3, np.inf))
@@ -128,7 +128,7 @@ def sampled(batches: Iterable[tuple[int, Columns]], most: int) -> tuple[int, dic
         pieces.append(_below(piece, limit))
         number += len(pieces[-1]["drawn"])
         while number > most:
-            limit //= 2
+            limit -= limit // 10
             pieces = [_below(one, limit) for one in pieces]
             number = sum(len(one["drawn"]) for one in pieces)
     if not pieces:
@@ -142,7 +142,7 @@ def first_limit(parts: Sequence[Part]) -> int:
     """Return the limit by which at most ``DRAWN`` points leave the reader, if LAS files say how many they have."""
     claimed, limit = sum(part.stop - part.start for part in parts if isinstance(part, LasPart)), ALL
     while claimed > DRAWN:
-        claimed, limit = claimed // 2, limit // 2
+        claimed, limit = claimed - claimed // 10, limit - limit // 10
     return limit
 
 

@@ -30,8 +30,10 @@ from pipeline.maths.surfaces.outline import inside
 from pipeline.mount import Mounted
 
 Array = NDArray[np.float64]
-MOST = 200_000  # points that are adjusted
-READINGS = 4  # of these points: the planes are found anew along the track, and need not settle
+Integers = NDArray[np.int64]
+MOST, MOST_RECORDS = 200_000, 15_000  # points that are adjusted; INS records after which they lie
+BURST = 50  # records that follow each other and are used together: those of one knot of the drift or two
+READINGS = 3  # of these points, for weights and scales: the planes are found anew along the track, and need not settle
 GATE_M = 0.1  # of a point from its plane: the drift, and the plane's own error
 
 
@@ -72,7 +74,7 @@ def track_without_drift(
 
 def _points_on(planes: Sequence[DryPlane], points: KeptPoints) -> Batch:
     """Return columns of the points on the planes, each on the nearest, within the outlines."""
-    rows = np.arange(0, len(points), max(1, -(-len(points) // MOST)))
+    rows = _fewer(points)
     level_m = points.level_m[rows]
     face, nearest = np.full(len(rows), -1, dtype=np.int16), np.full(len(rows), GATE_M)
     for k, plane in enumerate(planes):
@@ -86,6 +88,17 @@ def _points_on(planes: Sequence[DryPlane], points: KeptPoints) -> Batch:
     for frame, places in (("laser", points.own_m[rows[used]]), ("target", level_m[used])):
         columns |= {f"{axis}_{frame}_m": places[:, k] for k, axis in enumerate("xyz")}
     return columns
+
+
+def _fewer(points: KeptPoints) -> Integers:
+    """Return the rows (k,) of the points to adjust: of a long session those of some bursts of records, evenly spread.
+
+    Each record with points costs as much as a hundred points, and the drift needs a few hundred points a second.
+    """
+    rows = np.arange(0, len(points), max(1, -(-len(points) // MOST)))
+    record, _ = points.context.trajectory.interval_of(points.t_ns[rows])
+    bursts, burst = np.unique(record // BURST, return_inverse=True)
+    return np.asarray(rows[burst % max(1, -(-len(bursts) * BURST // MOST_RECORDS)) == 0])
 
 
 def _problem(

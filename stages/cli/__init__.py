@@ -3,6 +3,7 @@
 A command's module and its imports are loaded only when the command is called. Therefore ``--help`` answers at once.
 """
 
+import atexit
 import sys
 from pathlib import Path
 
@@ -46,5 +47,6 @@ def _without_language(words: list[str]) -> list[str]:
 
 def main() -> None:
     """Run the command line of this process, as the console script does."""
+    atexit.register(entry.leave)
     entry.prepare_process()
     entry.end_process(call(sys.argv[1:]))

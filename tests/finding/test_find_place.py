@@ -12,6 +12,7 @@ from pipeline.config.yaml_models import parse
 from pipeline.finding.found_text import table_rows, table_text
 from pipeline.finding.place import FoundPlace
 from pipeline.finding.pool_file import pool_yaml
+from pipeline.finding.without_drift import MOST_RECORDS
 from pipeline.maths.geometry.geodesy import PoolFrame
 from pipeline.maths.target.model import TargetModel
 from pipeline.results.pages.place_page import place_page
@@ -84,9 +85,11 @@ DRIFT: dict[str, Any] = {
 }
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-def test_the_drift_makes_no_wall_uneven(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("seed", "records"), [(1, MOST_RECORDS), (2, MOST_RECORDS), (2, 1000)])
+def test_the_drift_makes_no_wall_uneven(seed: int, records: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """records: most from which the drift is taken; of this session all, or a sixth."""
     session = made(turned(20.0), DRIFT, seed=seed)
+    monkeypatch.setattr("pipeline.finding.without_drift.MOST_RECORDS", records)
 
     def uneven_m() -> float:
         place = found(session)

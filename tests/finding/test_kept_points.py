@@ -90,12 +90,13 @@ def stretch(start: int, stop: int) -> LasPart:
 
 
 def test_of_large_files_few_points_leave_the_reader() -> None:
-    """By halves, so that never fewer than half of what may leave it do; of other files nobody knows the number."""
+    """By tenths, so that nearly as many as may leave it do; of other files nobody knows the number."""
     assert first_limit([stretch(0, DRAWN)]) == ALL
-    assert first_limit([stretch(0, DRAWN), stretch(DRAWN, DRAWN + 2)]) == ALL // 2
-    assert first_limit([stretch(0, 4_000_000), stretch(4_000_000, 8 * DRAWN)]) == ALL // 8
+    assert first_limit([stretch(0, DRAWN), stretch(DRAWN, DRAWN + 2)]) == ALL - ALL // 10
+    share = first_limit([stretch(0, 4_000_000), stretch(4_000_000, 8 * DRAWN)]) / ALL
+    assert 0.9 * 1 / 8 < share <= 1 / 8
     assert first_limit([MemoryPart("0", {"t_ns": np.zeros(10 * DRAWN, dtype=np.int8)})]) == ALL
-    assert DRAWN >= 4 * MOST
+    assert DRAWN >= 2 * MOST  # half of the points may be far
 
 
 def test_the_sample_is_the_same_if_fewer_points_leave_the_reader(
