@@ -114,6 +114,7 @@ thorough: lint ## every test, with more draws, kills and damaged files than a us
 
 bench: $(SETUP) ## time and memory of whole runs of several sizes, against bare decoding
 	$(PY) -m tools.bench
+	$(PY) -m tools.finding_speed runs/bench/session-large --repeats 7
 
 pictures: $(DEMO)/.simulated ## the documents' pictures, anew (after make setup-visual)
 	$(POOLCAL) run $(DEMO) --config $(DEMO)/pool.yaml --run runs/demo

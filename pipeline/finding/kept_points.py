@@ -2,8 +2,9 @@
 
 A point is kept if the number that its time is scattered to lies below a limit, which falls by a tenth whenever too
 many are kept. So the sample does not depend on how the files are divided or how many workers read them, all stretches
-of the session have their share, and the memory is the same for any session. Where the files say how many points they have, the
-limit begins so low that not many more than are kept leave the reader. Points are placed when the sample is complete.
+of the session have their share, and the memory is the same for any session. Where the files say how many points they
+have, the limit begins so low that not many more than are kept leave the reader. Points are placed when the sample is
+complete.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
