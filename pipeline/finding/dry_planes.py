@@ -34,6 +34,7 @@ LEAST_M, BOW_M, COVERED = 1.0, 0.03, 0.6  # extent; bow; share of the cells seen
 RISE_M, FEW_M2 = 0.4, 0.1  # least rise of its dry part; area of the densest plane with as many points as it needs
 NEAR_WATER_M = 0.5  # largest height of a plane's lower end above the water
 COLUMN_SPREAD_M, FEWEST_COLUMNS, FULL = 0.1, 6, 20  # columns of points that end at the water; points of a column
+FOOT_M = 0.5  # of a column, above its lowest points
 
 
 def dry_planes(points_m: Array, boat_m: Array, mapper: Mapper = serial) -> list[DryPlane]:
@@ -153,7 +154,17 @@ def _column_ends(along_m: Array, heights_m: Array) -> Array:
     counts = np.bincount(column - column.min(initial=0))
     order = np.argsort(column, kind="stable")
     columns = np.split(heights_m[order], np.cumsum(counts)[:-1])
-    return np.array([np.partition(one, len(one) // 50)[len(one) // 50] for one in columns if len(one) >= FULL])
+    return np.array([_end(one) for one in columns if len(one) >= FULL])
+
+
+def _end(heights_m: Array) -> float:
+    """Return the height at which a column's points end, but for a few below it, such as images in the water.
+
+    Of all points a fiftieth lies below: on a wall of 4 m that is 8 cm. So the same is asked of its lowest half metre.
+    """
+    about_m = np.partition(heights_m, len(heights_m) // 50)[len(heights_m) // 50]
+    foot_m = heights_m[heights_m <= about_m + FOOT_M]
+    return float(np.partition(foot_m, len(foot_m) // 25)[len(foot_m) // 25])
 
 
 def _refusal(plane: DryPlane) -> str:

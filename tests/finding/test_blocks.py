@@ -17,7 +17,8 @@ from tests.support.simulated import made
 
 @pytest.fixture(scope="module")
 def place() -> FoundPlace:
-    return found(made({"track": {"distances_m": [4.0, 8.0, 5.0, 7.0]}, "laser": {"point_rate_hz": 20_000.0}}))
+    """To 3.8 m below the water, where no gap ends."""
+    return found(made({"track": {"distances_m": [4.0, 8.0, 5.0, 7.0]}, "laser": {"point_rate_hz": 20_000.0}}), 3.8)
 
 
 def sides(place: FoundPlace) -> dict[str, np.ndarray]:
@@ -47,6 +48,11 @@ def test_gaps_are_those_between_the_blocks_and_go_on_below_the_water(place: Foun
     seen = gaps[gaps[:, 0] > 0.2]
     np.testing.assert_allclose(np.diff(seen, axis=1), 0.5, atol=0.08)
     assert np.all(np.diff(gaps[gaps[:, 0] < -0.6], axis=1) > 0.46)
+
+
+def test_the_water_is_found_at_the_lower_end_of_a_wall_of_four_metres(place: FoundPlace) -> None:
+    """The origin is at the water. A fiftieth of the points would be 8 cm of it."""
+    assert place.height_m == pytest.approx(12.0, abs=0.04)
 
 
 def test_the_wall_between_them_has_none(place: FoundPlace) -> None:

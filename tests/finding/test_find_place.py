@@ -56,7 +56,7 @@ def test_a_dock_is_found_where_it_is(azimuth_deg: float, water_level_m: float) -
     there = true_frame.points_from_ecef(frame.points_to_ecef(np.zeros((1, 3))))[0]
     assert abs(there[0]) < 0.05
     level = there[2] + config.target.water_level_m
-    assert level == pytest.approx(water_level_m, abs=0.08)
+    assert level == pytest.approx(water_level_m, abs=0.05)
 
 
 def turns_deg(session: SimulatedSession, place: FoundPlace) -> list[float]:
