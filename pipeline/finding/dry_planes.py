@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from pipeline.artefacts.streams import Mapper, serial
 from pipeline.errors import RawDataError
-from pipeline.finding.dry_plane import DryPlane
-from pipeline.finding.gaps import EMPTY, USUAL, dry_gaps
+from pipeline.finding.dry_plane import LEVEL_DEG, DryPlane
+from pipeline.finding.gaps import ALIKE_M, EMPTY, USUAL, dry_gaps, in_gaps, top_m
 from pipeline.finding.plane_cells import CELL_M, CORNERS, FEWEST, OFF_M, UNEVEN_M, cells_on
 from pipeline.finding.stacked_planes import with_stacks_joined
 from pipeline.maths.adjustment.profiles import NORMAL
 from pipeline.maths.surfaces.flatness import cells_of, flatness, plane_axes
 from pipeline.maths.surfaces.growing import GrowthLimits, Plane, grown_regions, plane_of_voxels
-from pipeline.maths.surfaces.outline import area, convex_hull, inside, shrunk, simplified
+from pipeline.maths.surfaces.outline import area, clipped, convex_hull, inside, shrunk, simplified
 from pipeline.maths.surfaces.voxels import voxels_with_rows
 
 Array = NDArray[np.float64]
@@ -101,14 +101,18 @@ def _plane(all_m: Array, rows: Integers, grown: Plane | DryPlane, boat_m: Array)
         distance_m = float(normal @ mean)
     sense = 1.0 if normal @ boat_m > distance_m else -1.0
     normal, distance_m = sense * normal, sense * distance_m
-    _, outline = cells_on(dry_m, normal, distance_m, CELL_M, MARGIN_M)
+    in_it_m = dry_m[np.abs(dry_m @ normal - distance_m) <= UNEVEN_M]  # without ledges, which spoil whole cells
+    _, outline = cells_on(in_it_m, normal, distance_m, CELL_M, MARGIN_M)
     on_m = all_m[(np.abs(all_m @ normal - distance_m) <= UNEVEN_M) & (all_m[:, 2] > waves_m)]
     outline = _near_the_edge(on_m, normal, outline)
     away = points_m @ normal - distance_m
     on = np.abs(away) <= OFF_M
     in_plane, heights, away = points_m[on] @ plane_axes(normal).T, points_m[on, 2], away[on]
+    heights_m = on_m[_between_ends(outline, on_m @ plane_axes(normal).T), 2]
+    outline, gaps_m = _below(outline, normal, distance_m, top_m(heights_m)), dry_gaps(heights_m)
     within = inside(outline, in_plane)
-    flat = flatness(in_plane[within], away[within], CELL_M)
+    judged = _between_ends(outline, in_plane) & ~in_gaps(heights, gaps_m)
+    flat = flatness(in_plane[judged], away[judged], CELL_M)
     cells_m, _ = cells_on(points_m, normal, distance_m, CELL_M, MARGIN_M)
     if len(cells_m):  # the extent is that of all cells, the rest is judged within the outline
         width, height = (np.ptp(cells_m @ plane_axes(normal).T, axis=0) + CELL_M).tolist()
@@ -123,7 +127,7 @@ def _plane(all_m: Array, rows: Integers, grown: Plane | DryPlane, boat_m: Array)
         lowest_m=float(np.quantile(heights, 0.01)) if len(heights) else np.inf,
         column_ends_m=_column_ends(in_plane[:, 0], heights),
         sample_m=np.column_stack([in_plane[:, 0], heights, away])[:: max(1, len(heights) // SAMPLE)],
-        gaps_m=dry_gaps(on_m[inside(outline, on_m @ plane_axes(normal).T), 2]),
+        gaps_m=gaps_m,
     )
     return replace(made, refused=_refusal(made))
 
@@ -146,6 +150,24 @@ def _near_the_edge(on_m: Array, normal: Array, coarse: Array) -> Array:
         return coarse
     outermost = full & ~inside(shrunk(convex_hull(middles_m[full]), EDGE_CELL_M), middles_m)
     return simplified(shrunk(convex_hull(in_plane[outermost[inverse]]), EDGE_MARGIN_M), CORNERS)
+
+
+def _between_ends(outline_m: Array, in_plane_m: Array) -> NDArray[np.bool_]:
+    """Return which points (n, 2) lie in an outline, apart from its ends, where points of the next walls lie as well."""
+    within = inside(outline_m, in_plane_m)
+    if len(outline_m) and np.ptp(outline_m[:, 0]) > 3 * MARGIN_M:
+        low, high = outline_m[:, 0].min() + MARGIN_M, outline_m[:, 0].max() - MARGIN_M
+        within &= (in_plane_m[:, 0] > low) & (in_plane_m[:, 0] < high)
+    return within
+
+
+def _below(outline_m: Array, normal: Array, distance_m: float, top_m: float) -> Array:
+    """Return the part (k, 2) of an outline that lies below a height; the whole of a level plane's."""
+    _, up = plane_axes(normal)
+    if not np.isfinite(top_m) or up[2] < np.sin(np.radians(LEVEL_DEG)):
+        return outline_m
+    lower = clipped(outline_m, np.array([0.0, -1.0]), -(top_m - distance_m * normal[2]) / up[2])
+    return lower if len(lower) else outline_m
 
 
 def _column_ends(along_m: Array, heights_m: Array) -> Array:
@@ -211,11 +233,15 @@ def _lowest_ends(planes: Sequence[DryPlane]) -> float | None:
 
 
 def reaching_water(planes: Sequence[DryPlane], level_m: float) -> list[DryPlane]:
-    """Return the planes, with those refused besides that end above the water, or lie below it."""
+    """Return the planes, with those refused besides that end above the water, or lie below it.
+
+    A wall of blocks may end with one of its gaps.
+    """
     found = []
     for plane in planes:
         above = plane.lowest_m - level_m
-        if not plane.refused and above > NEAR_WATER_M:
+        gap_m = float(np.diff(plane.gaps_m, axis=1).max(initial=0.0))
+        if not plane.refused and above > max(NEAR_WATER_M, gap_m + ALIKE_M):
             plane = replace(plane, refused=f"ends {above:.1f} m above the water")
         elif not plane.refused and plane.corners_m(plane.outline_m)[:, 2].max() < level_m + WAVES_M:
             plane = replace(plane, refused="lies below the water: a mirror image")

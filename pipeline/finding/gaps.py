@@ -29,21 +29,42 @@ def dry_gaps(heights_m: Array) -> Array:
     >>> dry_gaps(np.concatenate(courses)).round(2).tolist()
     [[0.49, 1.01], [1.49, 2.01]]
     """
-    none = np.empty((0, 2))
+    low, bin_m, full = _full_bins(heights_m)
+    ends = [(low + bin_m * (below + 0.5), low + bin_m * (above + 0.5)) for below, above in pairwise(full.tolist())]
+    return np.array([end for end in ends if end[1] - end[0] >= LEAST_M]).reshape(-1, 2)[:MOST]
+
+
+def top_m(heights_m: Array) -> float:
+    """Return the height up to which a wall has points, among their heights (n,); inf if they are too few to tell.
+
+    >>> wall, strip_beside_it = np.arange(0.0, 2.0, 0.001), np.arange(2.0, 3.0, 0.02)
+    >>> round(top_m(np.concatenate([wall, strip_beside_it])), 2)
+    2.0
+    """
+    low, bin_m, full = _full_bins(heights_m)
+    return low + bin_m * (int(full[-1]) + 1) if len(full) else np.inf
+
+
+def _full_bins(heights_m: Array) -> tuple[float, float, NDArray[np.int64]]:
+    """Return the lowest height, the height of a bin, and the numbers of the bins that do not belong to a gap."""
+    none = np.empty(0, dtype=np.int64)
     if len(heights_m) < FULL:
-        return none
+        return 0.0, FINEST_M, none
     low, bin_m = float(heights_m.min()), FINEST_M
     while True:
         counts = np.bincount(np.floor((heights_m - low) / bin_m).astype(np.int64))
         usual = float(np.quantile(counts[counts > 0], USUAL))
         if usual >= FULL:
-            break
+            return low, bin_m, np.flatnonzero(counts >= EMPTY * usual)  # a bin at an end is half full in the mean
         if bin_m >= COARSEST_M:
-            return none
+            return low, bin_m, none
         bin_m *= 2
-    full = np.flatnonzero(counts >= EMPTY * usual)  # a bin at an end is half full in the mean
-    ends = [(low + bin_m * (below + 0.5), low + bin_m * (above + 0.5)) for below, above in pairwise(full.tolist())]
-    return np.array([end for end in ends if end[1] - end[0] >= LEAST_M]).reshape(-1, 2)[:MOST]
+
+
+def in_gaps(heights_m: Array, gaps_m: Array) -> NDArray[np.bool_]:
+    """Return which heights (n,) lie in one of the gaps (k, 2), or at its ends, where ledges are."""
+    inside = (heights_m[:, None] > gaps_m[:, 0] - FINEST_M) & (heights_m[:, None] < gaps_m[:, 1] + FINEST_M)
+    return np.asarray(inside.any(axis=1))
 
 
 def gaps_below(gaps_m: Array, seen_m: float, lowest_m: float) -> Array:
