@@ -3,9 +3,10 @@
 Regions grow from voxel to voxel and end at a gap. The part above it ends above the water, or is too small, and the part
 below it may be too low; together they make a higher wall. They are joined to a part that serves alone, if the plane of
 both together serves, and each part lies in it from end to end: what is set back would lean the plane. A course of
-blocks not much higher than a voxel makes no region; its points join the plane in which they lie. What lies below the
-water, or is far less dense than the plane, does not join: water mirrors walls. Planes beside each other are not joined:
-above the water they lie in one plane, but below it each has its own errors.
+blocks not much higher than a voxel makes no region, or one whose own plane its ledge has turned; its points join the
+plane in which they lie. What lies below the water, or is far less dense than the plane, does not join: water mirrors
+walls. Planes beside each other are not joined: above the water they lie in one plane, but below it each has its own
+errors.
 """
 
 from collections.abc import Callable, Sequence
@@ -28,6 +29,7 @@ SAME_M = 0.004  # largest distance of each part's own plane from that of both, o
 FEWEST_CELLS = 3  # of a part
 DENSE = 0.3  # of the plane's points to each area, or height: least that what joins it must have
 LEAST_M2 = 0.01  # an outline of less area is none
+THIN_M = 0.75  # a lower part is a course: what lies before it and behind it turns its own plane
 ON_M = 0.03  # largest distance of a course's points from the plane
 COURSE_M = 0.1  # heights in which a course's points are counted
 MOST_FAILED = 8  # parts that do not join: with more no further ones are tried, for each takes all points
@@ -60,7 +62,7 @@ def with_stacks_joined(
         Makes the plane of the points of some rows, given about where it lies.
     """
     left = sorted(range(len(planes)), key=lambda k: (-planes[k].points, k))
-    thin = [rows[k] for k in left if not _has_outline(planes[k])]  # lower or narrower than its margins
+    thin = [rows[k] for k in left if planes[k].flat.height_m < THIN_M or not _has_outline(planes[k])]
     free = np.sort(np.concatenate([free, *thin]))
     free = free[points_m[free, 2] > level_m]
     found, free_m, taken = [], points_m[free], np.zeros(len(points_m), dtype=bool)

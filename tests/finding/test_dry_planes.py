@@ -1,6 +1,7 @@
 """Planes that can serve and planes that cannot, both sides of each limit; the height of the water."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -38,15 +39,23 @@ def largest(points: Array) -> DryPlane:
     return dry_planes(points, BOAT)[0]
 
 
-def test_a_column_ends_where_its_lowest_fiftieth_does() -> None:
+def test_columns_with_points_enough_end_somewhere() -> None:
     """Of columns a cell wide, those with 20 points or more; the last ones of a wall have fewer, or more."""
     points = wall(4.1, 2.0)[:420]
     plane = largest(points)
     along = np.floor(points @ plane_axes(plane.normal)[0] / CELL_M)
     columns = [np.sort(points[along == k, 2]) for k in np.unique(along)]
-    expected = [heights[len(heights) // 50] for heights in columns if len(heights) >= FULL]
+    expected = [heights[0] for heights in columns if len(heights) >= FULL]  # a fiftieth of them is none
     assert len(columns) > len(expected) > 10
     np.testing.assert_array_equal(plane.column_ends_m, expected)
+
+
+@pytest.mark.parametrize("height_m", [2.0, 8.0])
+def test_a_high_wall_ends_at_the_water_too(height_m: float) -> None:
+    """And a few points of its image below the water, one to 200 of the wall's, do not move its end."""
+    points = wall(8.0, height_m)
+    image = points[::200] * [1, 1, -1] + [0, 0, 2 * WATER_M]
+    assert water_level_m([largest(np.concatenate([points, image]))]) == pytest.approx(WATER_M, abs=0.04)
 
 
 def test_echoes_of_the_water_move_no_plane_and_no_outline() -> None:
@@ -129,6 +138,53 @@ def test_a_wall_with_holes_does_not_serve(seen: float, refused: str) -> None:
     plane = largest(points[kept[row, column]])
     assert plane.refused.startswith(refused)
     assert bool(plane.refused) == bool(refused)
+
+
+COURSES = [(0.0, 0.5), (1.0, 2.5), (3.0, 3.5)]  # one at least serves alone
+
+
+def blocks(width_m: float, ledge_m: float = 0.0) -> Array:
+    """Points of a wall of courses of blocks with gaps over them; the top of each is seen so far back."""
+    points = wall(width_m, 4.0)
+    up = points[:, 2] - WATER_M
+    rng, n = np.random.default_rng(3), round(600 * width_m * ledge_m * len(COURSES))
+    top = np.array([high for _, high in COURSES])[rng.integers(len(COURSES), size=n)] + rng.normal(0, 0.005, n)
+    back, along = rng.uniform(0, ledge_m, n), rng.uniform(-width_m / 2, width_m / 2, n)
+    ledges = np.column_stack([FAR[0] + back, FAR[1] + along, WATER_M + top])
+    return np.concatenate([points[np.any([(up >= low) & (up <= high) for low, high in COURSES], axis=0)], ledges])
+
+
+def test_ledges_hide_no_course_and_bend_no_wall() -> None:
+    """All gaps are found, as they are without ledges, and the wall is as flat: tops of blocks lie behind its plane.
+
+    A wider wall shows where the water is.
+    """
+    plain = wall(6.0, 3.0) + np.array([0.0, 10.0, 0.0])
+    for ledge_m in (0.0, 0.1, 0.25, 0.6):
+        found = dry_planes(np.concatenate([blocks(3.0, ledge_m), plain]), BOAT)
+        (plane,) = [one for one in found if not one.refused and len(one.gaps_m)]
+        assert plane.refused == "", ledge_m
+        np.testing.assert_allclose(plane.gaps_m - WATER_M, [(0.5, 1.0), (2.5, 3.0)], atol=0.03)
+        assert plane.flat.uneven_m < 0.003
+        assert plane.outline_m[:, 1].max() - plane.outline_m[:, 1].min() > 2.9
+
+
+def test_the_next_walls_points_raise_no_top() -> None:
+    """Walls twice as high begin at both ends of this one, at 45°; for 4 cm their points lie in its plane."""
+    low, (along, up) = wall(2.0, 2.0), wall(3.0, 4.0, seed=2)[:, 1:].T - [[FAR[1]], [0.0]]
+    back = np.abs(along)
+    beside = np.column_stack([FAR[0] + back, FAR[1] + np.sign(along) * (1.0 + back), up])
+    (plane,) = [one for one in dry_planes(np.concatenate([low, beside]), BOAT) if abs(one.normal[0]) > 0.99]
+    assert plane.refused == ""
+    assert plane.corners_m(plane.outline_m)[:, 2].max() == pytest.approx(WATER_M + 2.0, abs=0.1)
+
+
+@pytest.mark.parametrize(("gap_m", "above_m", "serves"), [(0.0, 0.55, False), (0.5, 0.53, True), (0.5, 0.6, False)])
+def test_a_wall_of_blocks_may_end_with_a_gap(gap_m: float, above_m: float, serves: bool) -> None:
+    """Half a metre of points is missing over the water; a wall without gaps would stand on piles."""
+    plane = replace(largest(wall(8.0, 3.0)), gaps_m=np.array([[10.0, 10.0 + gap_m]]) if gap_m else np.empty((0, 2)))
+    (judged,) = reaching_water([plane], plane.lowest_m - above_m)
+    assert (judged.refused == "") == serves
 
 
 def test_a_deck_is_level() -> None:
