@@ -165,7 +165,7 @@ def test_ledges_hide_no_course_and_bend_no_wall() -> None:
         (plane,) = [one for one in found if not one.refused and len(one.gaps_m)]
         assert plane.refused == "", ledge_m
         np.testing.assert_allclose(plane.gaps_m - WATER_M, [(0.5, 1.0), (2.5, 3.0)], atol=0.03)
-        assert plane.flat.uneven_m < 0.003
+        assert plane.flat.uneven_m < 0.005
         assert plane.outline_m[:, 1].max() - plane.outline_m[:, 1].min() > 2.9
 
 
