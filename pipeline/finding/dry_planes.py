@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pipeline.artefacts.streams import Mapper, serial
 from pipeline.errors import RawDataError
 from pipeline.finding.dry_plane import LEVEL_DEG, DryPlane
-from pipeline.finding.gaps import ALIKE_M, EMPTY, USUAL, dry_gaps, in_gaps, top_m
+from pipeline.finding.gaps import EMPTY, USUAL, dry_gaps, gaps_below, in_gaps, top_m
 from pipeline.finding.plane_cells import CELL_M, CORNERS, FEWEST, OFF_M, UNEVEN_M, cells_on
 from pipeline.finding.stacked_planes import with_stacks_joined
 from pipeline.maths.adjustment.profiles import NORMAL
@@ -34,7 +34,7 @@ LEAST_M, BOW_M, COVERED = 1.0, 0.03, 0.6  # extent; bow; share of the cells seen
 RISE_M, FEW_M2 = 0.4, 0.1  # least rise of its dry part; area of the densest plane with as many points as it needs
 NEAR_WATER_M = 0.5  # largest height of a plane's lower end above the water
 COLUMN_SPREAD_M, FEWEST_COLUMNS, FULL = 0.1, 6, 20  # columns of points that end at the water; points of a column
-FOOT_M = 0.5  # of a column, above its lowest points
+FOOT_M = 0.5  # of a column, round its lowest points
 
 
 def dry_planes(points_m: Array, boat_m: Array, mapper: Mapper = serial) -> list[DryPlane]:
@@ -83,7 +83,8 @@ def _plane(all_m: Array, rows: Integers, grown: Plane | DryPlane, boat_m: Array)
     A grown region goes round its corners: by 6 cm into the next wall, which turns the plane of 3 m by 0.4°. So the
     plane is fitted again, to the means of the cells that lie on it, until it stays. Points just above the water are not
     used, for some of them are echoes of waves and splash, beside the wall and before it; nor are cells that stand off
-    more than the wall is uneven, for they see a part of a fender or of a ladder.
+    more than the wall is uneven, for they see a part of a fender or of a ladder. The outline is that of points in
+    the plane, whatever lies before them or behind them.
     """
     points_m, normal, distance_m = all_m[rows], grown.normal, grown.distance_m
     lowest_m, highest_m = np.quantile(points_m[:, 2], [0.01, 0.99])
@@ -111,10 +112,10 @@ def _plane(all_m: Array, rows: Integers, grown: Plane | DryPlane, boat_m: Array)
     heights_m = on_m[_between_ends(outline, on_m @ plane_axes(normal).T), 2]
     outline, gaps_m = _below(outline, normal, distance_m, top_m(heights_m)), dry_gaps(heights_m)
     within = inside(outline, in_plane)
-    judged = _between_ends(outline, in_plane) & ~in_gaps(heights, gaps_m)
+    judged = within & ~in_gaps(heights, gaps_m)
     flat = flatness(in_plane[judged], away[judged], CELL_M)
     cells_m, _ = cells_on(points_m, normal, distance_m, CELL_M, MARGIN_M)
-    if len(cells_m):  # the extent is that of all cells, the rest is judged within the outline
+    if len(cells_m):  # the extent is that of all cells
         width, height = (np.ptp(cells_m @ plane_axes(normal).T, axis=0) + CELL_M).tolist()
         flat = replace(flat, width_m=width, height_m=height)
     made = DryPlane(
@@ -182,10 +183,10 @@ def _column_ends(along_m: Array, heights_m: Array) -> Array:
 def _end(heights_m: Array) -> float:
     """Return the height at which a column's points end, but for a few below it, such as images in the water.
 
-    Of all points a fiftieth lies below: on a wall of 4 m that is 8 cm. So the same is asked of its lowest half metre.
+    Of all points a fiftieth lies below: on a wall of 4 m that is 8 cm. So those within half a metre are asked again.
     """
     about_m = np.partition(heights_m, len(heights_m) // 50)[len(heights_m) // 50]
-    foot_m = heights_m[heights_m <= about_m + FOOT_M]
+    foot_m = heights_m[np.abs(heights_m - about_m) <= FOOT_M]
     return float(np.partition(foot_m, len(foot_m) // 25)[len(foot_m) // 25])
 
 
@@ -233,17 +234,20 @@ def _lowest_ends(planes: Sequence[DryPlane]) -> float | None:
 
 
 def reaching_water(planes: Sequence[DryPlane], level_m: float) -> list[DryPlane]:
-    """Return the planes, with those refused besides that end above the water, or lie below it.
-
-    A wall of blocks may end with one of its gaps.
-    """
+    """Return the planes, with those refused besides that end above the water, or lie below it."""
     found = []
     for plane in planes:
         above = plane.lowest_m - level_m
-        gap_m = float(np.diff(plane.gaps_m, axis=1).max(initial=0.0))
-        if not plane.refused and above > max(NEAR_WATER_M, gap_m + ALIKE_M):
+        if not plane.refused and above > NEAR_WATER_M and not _ends_with_a_gap(plane, level_m):
             plane = replace(plane, refused=f"ends {above:.1f} m above the water")
         elif not plane.refused and plane.corners_m(plane.outline_m)[:, 2].max() < level_m + WAVES_M:
             plane = replace(plane, refused="lies below the water: a mirror image")
         found.append(plane)
     return found
+
+
+def _ends_with_a_gap(plane: DryPlane, level_m: float) -> bool:
+    """Return whether gaps of a wall repeat, and the next one reaches from its lowest points to the water."""
+    above = plane.lowest_m - level_m
+    next_ones = gaps_below(plane.gaps_m - level_m, above, -above)
+    return len(next_ones) > 0 and bool(next_ones[-1, 0] <= COLUMN_SPREAD_M)

@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 FINEST_M, COARSEST_M = 0.02, 0.04  # heights of the bins: coarser ones could not say where a gap ends
 USUAL = 0.75  # quantile of the bins' points: up to three quarters of a wall may be gaps
 FULL = 20  # points of a usual bin: with fewer the bins must be higher
-EMPTY = 0.2  # of the points of a usual bin: a bin with fewer belongs to a gap, where parts of other walls may be seen
+EMPTY = 0.2  # of the points of a usual bin: a bin with fewer may belong to a gap; in its mean they are half as many
 LEAST_M = 0.2  # a lower gap is none: on a far wall in calm water the scanner's lines may be as far apart
 ALIKE_M = 0.04  # largest difference of gaps of one height, and of their places from a regular row
 FURTHER_M = 0.005  # by which the place of a gap is less certain with each repeat
@@ -29,9 +29,14 @@ def dry_gaps(heights_m: Array) -> Array:
     >>> dry_gaps(np.concatenate(courses)).round(2).tolist()
     [[0.49, 1.01], [1.49, 2.01]]
     """
-    low, bin_m, full = _full_bins(heights_m)
-    ends = [(low + bin_m * (below + 0.5), low + bin_m * (above + 0.5)) for below, above in pairwise(full.tolist())]
-    return np.array([end for end in ends if end[1] - end[0] >= LEAST_M]).reshape(-1, 2)[:MOST]
+    low, bin_m, counts, usual = _bins(heights_m)
+    full = np.flatnonzero(counts >= EMPTY * usual)  # a bin at an end is half full in the mean
+    gaps = [
+        (low + bin_m * (below + 0.5), low + bin_m * (above + 0.5))
+        for below, above in pairwise(full.tolist())
+        if bin_m * (above - below) >= LEAST_M and counts[below + 1 : above].mean() <= EMPTY * usual / 2
+    ]
+    return np.array(gaps).reshape(-1, 2)[:MOST]
 
 
 def top_m(heights_m: Array) -> float:
@@ -41,23 +46,24 @@ def top_m(heights_m: Array) -> float:
     >>> round(top_m(np.concatenate([wall, strip_beside_it])), 2)
     2.0
     """
-    low, bin_m, full = _full_bins(heights_m)
+    low, bin_m, counts, usual = _bins(heights_m)
+    full = np.flatnonzero(counts >= EMPTY * usual)
     return low + bin_m * (int(full[-1]) + 1) if len(full) else np.inf
 
 
-def _full_bins(heights_m: Array) -> tuple[float, float, NDArray[np.int64]]:
-    """Return the lowest height, the height of a bin, and the numbers of the bins that do not belong to a gap."""
-    none = np.empty(0, dtype=np.int64)
+def _bins(heights_m: Array) -> tuple[float, float, NDArray[np.int64], float]:
+    """Return the lowest height, the height of a bin, the points of each and of a usual one; no bins of few points."""
+    few = 0.0, COARSEST_M, np.empty(0, dtype=np.int64), 0.0
     if len(heights_m) < FULL:
-        return 0.0, FINEST_M, none
+        return few
     low, bin_m = float(heights_m.min()), FINEST_M
     while True:
         counts = np.bincount(np.floor((heights_m - low) / bin_m).astype(np.int64))
         usual = float(np.quantile(counts[counts > 0], USUAL))
         if usual >= FULL:
-            return low, bin_m, np.flatnonzero(counts >= EMPTY * usual)  # a bin at an end is half full in the mean
+            return low, bin_m, counts, usual
         if bin_m >= COARSEST_M:
-            return low, bin_m, none
+            return few
         bin_m *= 2
 
 

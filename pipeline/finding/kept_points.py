@@ -1,10 +1,10 @@
 """A sample of the laser's points round the boat, placed by the INS, in one reading.
 
 A point is kept if the number that its time is scattered to lies below a limit, which falls by a tenth whenever too
-many are kept. So the sample does not depend on how the files are divided or how many workers read them, all stretches
-of the session have their share, and the memory is the same for any session. Where the files say how many points they
-have, the limit begins so low that not many more than are kept leave the reader. Points are placed when the sample is
-complete.
+many are kept. So the sample does not depend on how many workers read the files, all stretches of the session have the
+same share, and the memory is the same for any session. Where the files say how many points they have, the limit begins
+so low that not many more than are kept leave the reader; where they do not, each part finds its own limit, and the
+least is that of all. Points are placed when the sample is complete.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -29,6 +29,7 @@ from pipeline.readers.las import LasPart
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Columns = Mapping[str, NDArray[Any]]
+Drawn = tuple[int, int, Columns]  # number of points, the largest number that was drawn and kept, the kept points
 MOST = 500_000  # points of the sample
 DRAWN = 2 * MOST  # points that leave the reader, near the boat or not, if the files say how many there are
 FARTHEST_M = 50.0  # of a point from the INS
@@ -75,7 +76,7 @@ def level_context(ins: pd.DataFrame) -> PoolContext:
     return PoolContext.of(ins, one_pass, pd.DataFrame(place), EVERYWHERE)
 
 
-def kept_points(drawn: Iterable[tuple[int, Columns]], context: PoolContext, laser: LaserPlacement) -> KeptPoints:
+def kept_points(drawn: Iterable[Drawn], context: PoolContext, laser: LaserPlacement) -> KeptPoints:
     """Return the sample of a session's laser points; an error if the INS covers none of them.
 
     Parameters
@@ -87,7 +88,16 @@ def kept_points(drawn: Iterable[tuple[int, Columns]], context: PoolContext, lase
     laser
         The laser's mount and frame.
     """
-    read, sample = sampled(((count, _near(columns, context, laser)) for count, columns in drawn if columns), MOST)
+    limits = [ALL]
+
+    def near() -> Iterator[tuple[int, Columns]]:
+        for count, limit, columns in drawn:
+            limits.append(limit)
+            if columns:
+                yield count, _near(columns, context, laser)
+
+    read, _, sample = sampled(near(), MOST)
+    sample = _below(sample, min(limits)) if sample else sample  # all parts have the same share
     if not sample or not len(sample["t_ns"]):
         raise RawDataError(
             f"laser: none of {read:,} points lies within {FARTHEST_M:g} m of the boat while the INS recorded; "
@@ -97,10 +107,10 @@ def kept_points(drawn: Iterable[tuple[int, Columns]], context: PoolContext, lase
     return KeptPoints(sample["t_ns"], own, level, read, context)
 
 
-def drawn_points(part: Part, limit: int) -> tuple[int, Columns]:
-    """Return the number of a part's points, and columns of those that drew a number up to a limit, at most ``DRAWN``.
+def drawn_points(part: Part, limit: int) -> Drawn:
+    """Return the number of a part's points, the limit, and columns of those that drew no larger number.
 
-    The columns are those of the reader, and ``drawn``.
+    These are at most ``DRAWN``: with more the limit falls. The columns are those of the reader, and ``drawn``.
     """
     return sampled(_drawn(replace(part, limit=limit) if isinstance(part, LasPart) else part, limit), DRAWN)
 
@@ -111,8 +121,8 @@ def _drawn(part: Part, limit: int) -> Iterator[tuple[int, Columns]]:
         yield len(drawn) + chunk.undrawn, _below(dict(chunk.columns) | {"drawn": drawn}, limit)
 
 
-def sampled(batches: Iterable[tuple[int, Columns]], most: int) -> tuple[int, dict[str, NDArray[Any]]]:
-    """Return the number of all points, and the columns of a sample of at most so many, in order of time.
+def sampled(batches: Iterable[tuple[int, Columns]], most: int) -> Drawn:
+    """Return the number of all points, the limit, and the columns of a sample of at most so many, in order of time.
 
     Parameters
     ----------
@@ -133,10 +143,10 @@ def sampled(batches: Iterable[tuple[int, Columns]], most: int) -> tuple[int, dic
             pieces = [_below(one, limit) for one in pieces]
             number = sum(len(one["drawn"]) for one in pieces)
     if not pieces:
-        return read, {}
+        return read, limit, {}
     together = {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]}
     order = np.argsort(together["t_ns"], kind="stable")
-    return read, {name: column[order] for name, column in together.items()}
+    return read, limit, {name: column[order] for name, column in together.items()}
 
 
 def first_limit(parts: Sequence[Part]) -> int:

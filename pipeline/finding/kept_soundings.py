@@ -28,7 +28,7 @@ class KeptSoundings:
 
 def kept_soundings(stream: Stream, context: PoolContext, mbes: SonarPlacement, level_m: float) -> KeptSoundings:
     """Return the sample of a session's soundings in its passes; ``level_m``: z of the water in that frame."""
-    read, sample = sampled(stream.fold(_placed, context, mbes, level_m), MOST)
+    read, _, sample = sampled(stream.fold(_placed, context, mbes, level_m), MOST)
     if not sample:
         return KeptSoundings(np.empty(0, dtype=np.int16), np.empty((0, 3)), read)
     return KeptSoundings(sample["pass"], sample["points_m"], read)

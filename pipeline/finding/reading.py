@@ -15,13 +15,13 @@ from pipeline.adjustment.ins_drift import drift_model, pose_noise
 from pipeline.artefacts.catalogue.points import INS_SIGMAS
 from pipeline.artefacts.streams import Batch, Part, Stream
 from pipeline.config.session import Ins
-from pipeline.finding.kept_points import Columns, drawn_points, first_limit
+from pipeline.finding.kept_points import Drawn, drawn_points, first_limit
 from pipeline.maths.adjustment.pose_errors import PoseNoise
 from pipeline.readers.file_summaries import thin_sigmas
 from pipeline.readers.track_tables import trajectory_table
 
 
-def read_files(ins: Stream, laser: Stream) -> tuple[pd.DataFrame, list[Batch], Iterator[tuple[int, Columns]]]:
+def read_files(ins: Stream, laser: Stream) -> tuple[pd.DataFrame, list[Batch], Iterator[Drawn]]:
     """Return the INS's records in order of time, the sigmas that its files state, and the laser's drawn points.
 
     Points come part by part, as the workers read them (:func:`pipeline.finding.kept_points.drawn_points`).

@@ -85,6 +85,8 @@ def with_stacks_joined(
             for other in list(left):
                 if planes[other].lowest_m <= level_m - BELOW_M or other in failed or len(failed) >= MOST_FAILED:
                     continue
+                if taken[rows[other]].mean() > 0.5:  # as courses
+                    continue
                 if may_be_one(plane, planes[other]):
                     joined = plane_of(np.concatenate([points, rows[other]]), plane)
                     if all(lies_in(joined, points_m[part]) for part in (points, rows[other])):

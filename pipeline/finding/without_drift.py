@@ -24,15 +24,15 @@ from pipeline.maths.adjustment.observed_surface import ObservedSurface
 from pipeline.maths.adjustment.parameters import State
 from pipeline.maths.adjustment.pose_errors import PoseNoise
 from pipeline.maths.adjustment.solution import ConsiderErrors
-from pipeline.maths.geometry.trajectory import Trajectory
+from pipeline.maths.geometry.trajectory import NS_PER_S, Trajectory
 from pipeline.maths.surfaces.flatness import plane_axes
 from pipeline.maths.surfaces.outline import inside
 from pipeline.mount import Mounted
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-MOST, MOST_RECORDS = 200_000, 15_000  # points that are adjusted; INS records after which they lie
-BURST = 50  # records that follow each other and are used together: those of one knot of the drift or two
+MOST, MOST_RECORDS = 200_000, 15_000  # points that are adjusted; INS records after which they lie, if that is enough
+BURST, APART_S = 50, 3.0  # records that are used together, for neighbours show their white noise; longest time without
 READINGS = 3  # of these points, for weights and scales: the planes are found anew along the track, and need not settle
 GATE_M = 0.1  # of a point from its plane: the drift, and the plane's own error
 
@@ -93,12 +93,15 @@ def _points_on(planes: Sequence[DryPlane], points: KeptPoints) -> Batch:
 def _fewer(points: KeptPoints) -> Integers:
     """Return the rows (k,) of the points to adjust: of a long session those of some bursts of records, evenly spread.
 
-    Each record with points costs as much as a hundred points, and the drift needs a few hundred points a second.
+    Each record with points costs as much as a hundred points; the drift of a second needs no more than a few dozen.
     """
-    rows = np.arange(0, len(points), max(1, -(-len(points) // MOST)))
-    record, _ = points.context.trajectory.interval_of(points.t_ns[rows])
-    bursts, burst = np.unique(record // BURST, return_inverse=True)
-    return np.asarray(rows[burst % max(1, -(-len(bursts) * BURST // MOST_RECORDS)) == 0])
+    trajectory = points.context.trajectory
+    record, _ = trajectory.interval_of(points.t_ns)
+    _, burst = np.unique(record // BURST, return_inverse=True)
+    burst_s = BURST * float(np.median(np.diff(trajectory.t_ns))) / NS_PER_S
+    every = min(-(-len(np.unique(record)) // MOST_RECORDS), int(APART_S / burst_s))
+    rows = np.flatnonzero(burst % max(1, every) == 0)
+    return rows[:: max(1, -(-len(rows) // MOST))]
 
 
 def _problem(

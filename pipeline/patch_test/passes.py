@@ -80,7 +80,7 @@ def read_passes(
     """
     records, sigmas, _ = read_files(ins, Stream((), ins.mapper, ins.here))
     context = level_context(records)
-    read, sample = sampled(soundings.fold(_drawn, context), MOST)
+    read, _, sample = sampled(soundings.fold(_drawn, context), MOST)
     if not sample or not len(sample["t_ns"]):
         raise RawDataError(
             f"mbes: none of {read:,} soundings lies within the time of the INS, between records no more than "

@@ -50,12 +50,21 @@ def test_columns_with_points_enough_end_somewhere() -> None:
     np.testing.assert_array_equal(plane.column_ends_m, expected)
 
 
-@pytest.mark.parametrize("height_m", [2.0, 8.0])
-def test_a_high_wall_ends_at_the_water_too(height_m: float) -> None:
-    """And a few points of its image below the water, one to 200 of the wall's, do not move its end."""
-    points = wall(8.0, height_m)
-    image = points[::200] * [1, 1, -1] + [0, 0, 2 * WATER_M]
-    assert water_level_m([largest(np.concatenate([points, image]))]) == pytest.approx(WATER_M, abs=0.04)
+@pytest.mark.parametrize("height_m", [2.0, 4.0, 6.0])
+@pytest.mark.parametrize("every", [10**9, 200, 67])
+def test_a_high_wall_ends_at_the_water_too(height_m: float, every: int) -> None:
+    """Columns of 300 points and more, and a few of the wall's image below the water: one to 67, or 200, of its own."""
+    points = np.concatenate([wall(8.0, height_m, seed=seed) for seed in range(4)])
+    image = points[::every] * [1, 1, -1] + [0, 0, 2 * WATER_M]
+    assert water_level_m([largest(np.concatenate([points, image]))]) == pytest.approx(WATER_M, abs=0.035)
+
+
+@pytest.mark.parametrize("width_m", [2.4, 3.0, 3.6, 4.5])
+def test_a_narrow_part_of_a_wall_is_no_row_of_gaps(width_m: float) -> None:
+    """Of the upper half the wall is a tenth to a quarter as wide: a bin there has about a fifth of the usual points."""
+    tower = wall(width_m, 3.0, seed=2) + np.array([0.0, 0.0, 3.0])
+    plane = largest(np.concatenate([wall(20.0, 3.0), tower]))
+    assert len(plane.gaps_m) == 0
 
 
 def test_echoes_of_the_water_move_no_plane_and_no_outline() -> None:
@@ -179,10 +188,24 @@ def test_the_next_walls_points_raise_no_top() -> None:
     assert plane.corners_m(plane.outline_m)[:, 2].max() == pytest.approx(WATER_M + 2.0, abs=0.1)
 
 
-@pytest.mark.parametrize(("gap_m", "above_m", "serves"), [(0.0, 0.55, False), (0.5, 0.53, True), (0.5, 0.6, False)])
-def test_a_wall_of_blocks_may_end_with_a_gap(gap_m: float, above_m: float, serves: bool) -> None:
-    """Half a metre of points is missing over the water; a wall without gaps would stand on piles."""
-    plane = replace(largest(wall(8.0, 3.0)), gaps_m=np.array([[10.0, 10.0 + gap_m]]) if gap_m else np.empty((0, 2)))
+@pytest.mark.parametrize(
+    ("gaps", "above_m", "serves"),
+    [
+        ([], 0.55, False),
+        ([1.5, 2.5], 0.55, True),
+        ([1.5, 2.5], 0.65, False),  # the gap would end above the water
+        ([1.5], 0.55, False),  # one alone
+        ([1.7, 2.7], 0.55, False),  # the next one would not begin where the points end
+    ],
+)
+def test_a_wall_of_blocks_may_end_with_a_gap(gaps: list[float], above_m: float, serves: bool) -> None:
+    """Half a metre of points is missing over the water: it may be the next gap of a row, of half a metre each.
+
+    gaps: heights of their lower ends above the next one's, which would end at the wall's lowest points.
+    """
+    plain = largest(wall(8.0, 3.0))
+    low = plain.lowest_m - 1.0 + np.array(gaps)[:, None]
+    plane = replace(plain, gaps_m=np.hstack([low, low + 0.5]))
     (judged,) = reaching_water([plane], plane.lowest_m - above_m)
     assert (judged.refused == "") == serves
 

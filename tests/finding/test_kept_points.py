@@ -35,13 +35,15 @@ def session() -> SimulatedSession:
     return made(TRACK)
 
 
-def kept(session: SimulatedSession, parts: int, shift_ns: int = 0, limit: int = ALL) -> KeptPoints:
+def kept(
+    session: SimulatedSession, parts: int = 1, shift_ns: int = 0, limit: int = ALL, ends: np.ndarray | None = None
+) -> KeptPoints:
     laser = parse(SessionConfig, session.session, "session").laser
     columns = dict(session.laser) | {"t_ns": session.laser["t_ns"] + shift_ns}
-    ends = np.linspace(0, len(columns["t_ns"]), parts + 1).astype(int)
+    ends = np.linspace(0, len(columns["t_ns"]), parts + 1).astype(int) if ends is None else ends
     pieces = [
         MemoryPart(str(k), {name: values[ends[k] : ends[k + 1]] for name, values in columns.items()})
-        for k in range(parts)
+        for k in range(len(ends) - 1)
     ]
     context = level_context(trajectory_table([session.ins])[0])
     drawn = [drawn_points(piece, limit) for piece in pieces]
@@ -110,12 +112,28 @@ def test_the_sample_is_the_same_if_fewer_points_leave_the_reader(
     np.testing.assert_array_equal(fewer.level_m, whole.level_m)
 
 
+def test_parts_of_different_sizes_have_the_same_share(
+    session: SimulatedSession, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of each pass a part: the larger one draws more points than may leave it, the smaller one does not."""
+    ends = session.laser["t_ns"].searchsorted(session.laser["t_ns"].min() + np.array([0, 5, 10**6]) * 10**9)
+    small, large = np.diff(ends)
+    monkeypatch.setattr("pipeline.finding.kept_points.DRAWN", large // 4)
+    assert small < large // 4
+    found = kept(session, ends=ends)
+    between = session.laser["t_ns"][ends[1]]
+    shares = np.array([np.sum(found.t_ns < between) / small, np.sum(found.t_ns >= between) / large])
+    assert shares[0] == pytest.approx(shares[1], rel=0.15)
+    assert shares[1] < 0.25
+
+
 def test_of_a_part_that_tells_no_number_a_bounded_sample_leaves_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("pipeline.finding.kept_points.DRAWN", 1000)
     t_ns = np.arange(400_000) * 8333
     columns = {"t_ns": t_ns} | {f"{axis}_m": np.arange(len(t_ns), dtype=float) for axis in "xyz"}
-    read, drawn = drawn_points(MemoryPart("0", columns), ALL)
+    read, limit, drawn = drawn_points(MemoryPart("0", columns), ALL)
     assert read == len(t_ns)
+    assert limit < ALL
     assert 400 < len(drawn["t_ns"]) <= 1000
     np.testing.assert_array_equal(drawn["drawn"], scattered(drawn["t_ns"]))
     np.testing.assert_array_equal(drawn["x_m"], drawn["t_ns"] // 8333)

@@ -27,6 +27,14 @@ def test_a_course_too_low_for_a_region_joins() -> None:
     np.testing.assert_allclose(wall.gaps_m, [[8.0 + 1.6, 8.0 + 2.2]], atol=0.04)
 
 
+@pytest.mark.parametrize("high_m", [0.3, 0.6, 0.9])
+def test_each_point_counts_once(high_m: float) -> None:
+    """A course of 0.6 m has a plane of its own, and joins by its points."""
+    points = np.concatenate([LOWER, part((0.0, 3.0), (2.2, 2.2 + high_m), seed=2)])
+    (wall,) = dry_planes(points, BOAT)
+    assert 0.7 * len(points) < wall.points < 0.95 * len(points)  # those near its edges are not counted
+
+
 @pytest.mark.parametrize("up", [(-2.0, -0.6), (-0.9, -0.6)])
 @pytest.mark.parametrize("share", [0.2, 1.0])
 def test_the_image_of_a_wall_in_the_water_does_not_join(share: float, up: tuple[float, float]) -> None:
