@@ -1,8 +1,11 @@
 """The rows of a campaign on disk: a line of JSON each during the campaign, a Parquet file at its end."""
 
 import json
-from collections.abc import Callable, Sequence
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from itertools import islice
 from multiprocessing import get_context
+from multiprocessing.pool import Pool
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -46,13 +49,43 @@ def collect_rows(
     lines.write_text("".join(map(_line, rows)), "utf-8")
     if tasks[len(rows) :]:
         with get_context("spawn").Pool(jobs, maxtasksperchild=tasks_of_a_worker) as pool:
-            for row in pool.imap(row_of, tasks[len(rows) :]):
+            for row in _in_order(pool, row_of, tasks[len(rows) :], jobs):
                 rows.append(row)
                 with lines.open("a", encoding="utf-8") as file:
                     file.write(_line(row))
     table = pd.DataFrame(rows[: len(tasks)])
     table.to_parquet(path, index=False)
     return table
+
+
+def _in_order(
+    pool: Pool, row_of: Callable[[Task], dict[str, Any]], tasks: Sequence[Task], jobs: int
+) -> Iterator[dict[str, Any]]:
+    """Yield the rows in order, and let the workers end by themselves, after an error too.
+
+    A worker that is ended while it hands over its row keeps the lock of the way back, and the pool waits for ever.
+    """
+    waiting, further = deque[Any](), iter(tasks)
+    try:
+        for task in islice(further, 2 * jobs):
+            waiting.append(pool.apply_async(row_of, (task,)))
+        while waiting:
+            row: dict[str, Any] = waiting[0].get()
+            waiting.popleft()
+            for task in islice(further, 1):
+                waiting.append(pool.apply_async(row_of, (task,)))
+            yield row
+    except Exception:
+        for one in waiting:
+            one.wait()
+        _end(pool)
+        raise
+    _end(pool)
+
+
+def _end(pool: Pool) -> None:
+    pool.close()
+    pool.join()
 
 
 def _line(row: dict[str, Any]) -> str:
