@@ -10,7 +10,6 @@ runs/montecarlo/accuracy.html.
 
 import argparse
 from dataclasses import dataclass
-from multiprocessing import get_context
 from pathlib import Path
 
 import jinja2
@@ -25,6 +24,7 @@ from pipeline.config.yaml_models import parse
 from pipeline.results.pages.rendering import drawing_style, picture
 from pipeline.simulation.scenario import Scenario
 from tools.bound import bound
+from tools.campaign_files import processes
 from tools.campaign_statistics import means_in_standard_errors, nse_band
 from tools.campaigns import CAMPAIGNS, FOLDER, Campaign, path_of, scenario_of
 from tools.session_rows import NAMES, UNITS
@@ -125,7 +125,7 @@ class Result:
 def campaign_results(folder: Path, bounds: int, jobs: int) -> list[Result]:
     """Return a result for each named campaign with rows in the folder; its bound is the mean over some sessions."""
     results = []
-    with get_context("spawn").Pool(jobs) as pool:
+    with processes(jobs) as pool:
         for campaign in CAMPAIGNS:
             path = folder / path_of(campaign).name
             if not campaign.name.startswith(NAMED) or not path.is_file():

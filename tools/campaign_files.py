@@ -3,6 +3,7 @@
 import json
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from itertools import islice
 from multiprocessing import get_context
 from multiprocessing.pool import Pool
@@ -48,8 +49,8 @@ def collect_rows(
     rows = _whole_rows(lines) if resume else []
     lines.write_text("".join(map(_line, rows)), "utf-8")
     if tasks[len(rows) :]:
-        with get_context("spawn").Pool(jobs, maxtasksperchild=tasks_of_a_worker) as pool:
-            for row in _in_order(pool, row_of, tasks[len(rows) :], jobs):
+        with processes(jobs, tasks_of_a_worker) as pool:
+            for row in in_order(pool, row_of, tasks[len(rows) :], jobs):
                 rows.append(row)
                 with lines.open("a", encoding="utf-8") as file:
                     file.write(_line(row))
@@ -58,34 +59,38 @@ def collect_rows(
     return table
 
 
-def _in_order(
-    pool: Pool, row_of: Callable[[Task], dict[str, Any]], tasks: Sequence[Task], jobs: int
-) -> Iterator[dict[str, Any]]:
-    """Yield the rows in order, and let the workers end by themselves, after an error too.
+@contextmanager
+def processes(jobs: int, tasks_of_a_worker: int | None = None) -> Iterator[Pool]:
+    """Yield a pool of worker processes, which end by themselves, after an error too.
 
     A worker that is ended while it hands over its row keeps the lock of the way back, and the pool waits for ever.
     """
-    waiting, further = deque[Any](), iter(tasks)
-    try:
-        for task in islice(further, 2 * jobs):
-            waiting.append(pool.apply_async(row_of, (task,)))
-        while waiting:
-            row: dict[str, Any] = waiting[0].get()
-            waiting.popleft()
-            for task in islice(further, 1):
-                waiting.append(pool.apply_async(row_of, (task,)))
-            yield row
-    except Exception:
-        for one in waiting:
-            one.wait()
+    with get_context("spawn").Pool(jobs, maxtasksperchild=tasks_of_a_worker) as pool:
+        try:
+            yield pool
+        except Exception:
+            _end(pool)
+            raise
         _end(pool)
-        raise
-    _end(pool)
 
 
 def _end(pool: Pool) -> None:
     pool.close()
     pool.join()
+
+
+def in_order(
+    pool: Pool, row_of: Callable[[Task], dict[str, Any]], tasks: Sequence[Task], jobs: int
+) -> Iterator[dict[str, Any]]:
+    """Yield the rows in order; few tasks wait in the pool, so that an error ends it soon."""
+    waiting, further = deque[Any](), iter(tasks)
+    for task in islice(further, 2 * jobs):
+        waiting.append(pool.apply_async(row_of, (task,)))
+    while waiting:
+        row: dict[str, Any] = waiting.popleft().get()
+        for task in islice(further, 1):
+            waiting.append(pool.apply_async(row_of, (task,)))
+        yield row
 
 
 def _line(row: dict[str, Any]) -> str:

@@ -14,7 +14,6 @@ line for each such campaign).
 
 import argparse
 import json
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +22,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from pipeline.maths.mount_parameters import SETTINGS
-from tools.campaign_files import collect_rows
+from tools.campaign_files import collect_rows, processes
 from tools.campaign_statistics import nse_band
 from tools.campaigns import DRIFT, FOLDER
 from tools.session_rows import NAMES, UNITS, error_columns
@@ -184,7 +183,7 @@ def main() -> None:
         table = collect_rows(path, session_row, tasks, options.jobs, options.resume, TASKS_OF_A_WORKER)
     if options.drift:
         return
-    with get_context("spawn").Pool(options.jobs) as pool:
+    with processes(options.jobs) as pool:
         bound = np.mean(pool.map(laser_bound_of, table["number"].tolist()[:BOUNDS]), axis=0)
     print(report(table, np.asarray(bound)))
 

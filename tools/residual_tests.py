@@ -14,7 +14,6 @@ import copy
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +24,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from scipy.stats import binom
 
+from tools.campaign_files import in_order, processes
 from tools.campaigns import DRIFT, FOLDER, TASKS_OF_A_WORKER, THIN, WHITE
 
 Array = NDArray[np.float64]
@@ -280,9 +280,9 @@ def main() -> None:
     done = read(path) if options.resume and path.is_file() else pd.DataFrame(columns=["fault", "seed"])
     written = set(zip(done["fault"], done["seed"], strict=True))
     left = [task for task in tasks if (task[0], seed_of(task)) not in written]
-    with get_context("spawn").Pool(options.jobs, maxtasksperchild=TASKS_OF_A_WORKER) as pool:
+    with processes(options.jobs, TASKS_OF_A_WORKER) as pool:
         # each row is written at once, so that an interruption loses none
-        for number, row in enumerate(pool.imap(session_row, left), start=len(done)):
+        for number, row in enumerate(in_order(pool, session_row, left, options.jobs), start=len(done)):
             pd.DataFrame([row]).to_csv(path, index=False, mode="a" if number else "w", header=not number)
     rows = read(path)
     rows.to_parquet(PATH, index=False)

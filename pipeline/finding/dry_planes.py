@@ -162,12 +162,12 @@ def _between_ends(outline_m: Array, in_plane_m: Array) -> NDArray[np.bool_]:
     return within
 
 
-def _below(outline_m: Array, normal: Array, distance_m: float, top_m: float) -> Array:
+def _below(outline_m: Array, normal: Array, distance_m: float, high_m: float) -> Array:
     """Return the part (k, 2) of an outline that lies below a height; the whole of a level plane's."""
     _, up = plane_axes(normal)
-    if not np.isfinite(top_m) or up[2] < np.sin(np.radians(LEVEL_DEG)):
+    if not np.isfinite(high_m) or up[2] < np.sin(np.radians(LEVEL_DEG)):
         return outline_m
-    lower = clipped(outline_m, np.array([0.0, -1.0]), -(top_m - distance_m * normal[2]) / up[2])
+    lower = clipped(outline_m, np.array([0.0, -1.0]), -(high_m - distance_m * normal[2]) / up[2])
     return lower if len(lower) else outline_m
 
 

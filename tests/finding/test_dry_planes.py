@@ -188,6 +188,18 @@ def test_the_next_walls_points_raise_no_top() -> None:
     assert plane.corners_m(plane.outline_m)[:, 2].max() == pytest.approx(WATER_M + 2.0, abs=0.1)
 
 
+@pytest.mark.parametrize("tilt_deg", [20.0, 45.0, 80.0, 100.0])
+def test_a_leaning_wall_is_cut_at_its_top(tilt_deg: float) -> None:
+    """At a height, not at a place up the plane: 30,000 points to 1.5 m over the water, and a thin strip above them."""
+    rng, n, upright = np.random.default_rng(4), 30_000, np.radians(tilt_deg)
+    along, height = rng.uniform(-3, 3, n), np.r_[rng.uniform(0, 1.5, n - 300), rng.uniform(1.5, 2.5, 300)]
+    along[-300:] = rng.uniform(-3.0, -2.9, 300)
+    back = height / np.tan(upright) + rng.normal(0, 0.004, n) / np.sin(upright)
+    plane = largest(np.column_stack([FAR[0] + back, FAR[1] + along, WATER_M + height]))
+    assert plane.tilt_deg == pytest.approx(tilt_deg, abs=0.3)
+    assert plane.corners_m(plane.outline_m)[:, 2].max() == pytest.approx(WATER_M + 1.5, abs=0.06)
+
+
 @pytest.mark.parametrize(
     ("gaps", "above_m", "serves"),
     [
