@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pipeline.adjustment.observation_model import ObservationModel
 from pipeline.adjustment.point_sums import SummedBatch
-from pipeline.artefacts.streams import point_array
+from pipeline.artefacts.streams import Batch, point_array
 from pipeline.maths.adjustment.design_matrix import FLATTEST
 from pipeline.maths.adjustment.parameters import State, kind_of
 
@@ -39,3 +39,17 @@ def heights_on_surface(model: ObservationModel, sensor: str, observed: SummedBat
     before, after = (at_records[record - used.start + k] for k in (0, 1))
     start = before + observed.share * (after - before)
     return np.asarray(start + reached_m / range_m * (measured - start) - model.wet_heights_m[1])
+
+
+def places_on_surface(model: ObservationModel, sensor: str, points: Batch, state: State) -> Array:
+    """Return the places (n, 3) m, target frame, where the rays of labelled points meet their surfaces; no drift."""
+    calibrated = sensor in state.heads
+    placed = model.points_in_target(sensor, points, state) if calibrated else point_array(points, "target_m")
+    ray = placed - model.body.trajectory.track_of_point(points["t_ns"], model.body.lever_arm(sensor, state))
+    number = model.faces.surface[points["face"]]
+    normal = np.array([surface.normal for surface in state.surfaces])[number]
+    distance_m = np.array([surface.distance_m for surface in state.surfaces])[number]
+    off_m = np.einsum("ni,ni->n", placed, normal) - distance_m - model.height_of_face[points["face"]]
+    approach = np.einsum("ni,ni->n", ray, normal)
+    beyond = off_m / np.where(np.abs(approach) > 1e-3, approach, np.inf)
+    return np.asarray(placed - beyond[:, None] * ray)

@@ -18,8 +18,8 @@ from pipeline.adjustment.iteration import MountAdjustment
 from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
 from pipeline.adjustment.point_sums import summed
 from pipeline.adjustment.problem import CalibrationProblem
-from pipeline.adjustment.residual_places import heights_on_surface
-from pipeline.artefacts.streams import Batch, Stream, point_array
+from pipeline.adjustment.residual_places import heights_on_surface, places_on_surface
+from pipeline.artefacts.streams import Batch, Stream
 from pipeline.gps_time import NS
 from pipeline.maths.adjustment.parameters import State, kind_of
 from pipeline.maths.adjustment.profiles import (
@@ -90,24 +90,10 @@ class OutsideStripes:
         kept &= ~np.isin(batch["face"], [stripe.face for stripe in stripes if stripe.whole])
         rows = np.flatnonzero(kept & np.isin(batch["face"], [stripe.face for stripe in stripes]))
         some = {name: column[rows] for name, column in batch.items()}
-        height = self._heights_m(some)
+        height = places_on_surface(self.model, self.sensor, some, self.state)[:, 2] - self.model.wet_heights_m[1]
         for stripe in stripes if len(rows) else ():
             kept[rows[(some["face"] == stripe.face) & (height > stripe.low_m) & (height < stripe.high_m)]] = False
         return {name: column[kept] for name, column in batch.items()}
-
-    def _heights_m(self, points: Batch) -> Array:
-        """Return the heights (n,) above the water at which the points' rays meet their surfaces, as in profiles."""
-        model, state = self.model, self.state
-        calibrated = self.sensor in state.heads
-        placed = model.points_in_target(self.sensor, points, state) if calibrated else point_array(points, "target_m")
-        ray = placed - model.body.trajectory.track_of_point(points["t_ns"], model.body.lever_arm(self.sensor, state))
-        number = model.faces.surface[points["face"]]
-        normal = np.array([surface.normal for surface in state.surfaces])[number]
-        distance_m = np.array([surface.distance_m for surface in state.surfaces])[number]
-        off_m = np.einsum("ni,ni->n", placed, normal) - distance_m - model.height_of_face[points["face"]]
-        approach = np.einsum("ni,ni->n", ray, normal)
-        beyond = off_m / np.where(np.abs(approach) > 1e-3, approach, np.inf)
-        return np.asarray(placed[:, 2] - beyond * ray[:, 2] - model.wet_heights_m[1])
 
 
 def profiles_by_height(

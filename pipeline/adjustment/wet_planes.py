@@ -4,6 +4,7 @@ That a wall goes straight on below the water is an assumption. A ledge, a footin
 where it fails. Soundings on such a face turn the mount, and the adjustment spreads its error over all faces. So after
 each adjustment every wet face is tested (:mod:`~pipeline.maths.adjustment.plane_tests`). What is left out:
 
+* squares in which something stands before the wall (:mod:`~pipeline.adjustment.wall_squares`), first of all;
 * faces with too few soundings to trust, and faces whose soundings fill their gate: the wall is not there;
 * heights at which a face is not the plane that it is elsewhere (:mod:`~pipeline.adjustment.wall_stripes`);
 * the face whose test is worst, if it exceeds the limit of all tests together, and explains more than any other. Then
@@ -27,6 +28,7 @@ from pipeline.adjustment.face_errors import FinalSolution
 from pipeline.adjustment.iteration import MountAdjustment, adjust_mount
 from pipeline.adjustment.parameter_strengths import parameter_tests
 from pipeline.adjustment.problem import CalibrationProblem
+from pipeline.adjustment.wall_squares import Squares, mixed_squares, without_squares
 from pipeline.adjustment.wall_stripes import OutsideStripes, Stripe, profiles_by_height, stripes_off
 from pipeline.artefacts.catalogue.results import LEFT_OUT
 from pipeline.artefacts.streams import Stream
@@ -63,10 +65,10 @@ class FaceLimits:
 class LeftOut:
     """A surface, or a stripe of it, whose soundings are left out.
 
-    family; why: "few", "scatter", "step" or "off", or "doubt" if it is not left out; points: their number; sensor: that
-    saw them; low_m, high_m: heights above the water, infinite at the ends of the face. unknown, value, sigma: the wet
-    face's parameter that is farthest off, rad or m; of a stripe value is what it stands off by, m; otherwise "" and
-    NaN.
+    family; why: "mixed", "few", "scatter", "step" or "off", or "doubt" if it is not left out; points: their number;
+    sensor: that saw them; low_m, high_m: heights above the water, infinite at the ends of the face. unknown, value,
+    sigma: the wet face's parameter that is farthest off, rad or m; of a stripe value is what it stands off by, m, of
+    mixed squares their area, m²; otherwise "" and NaN.
     """
 
     family: str
@@ -110,9 +112,13 @@ def adjust_true_faces(
     points, found, stripes, rough_to = dict(streams), list[LeftOut](), list[Stripe](), set[str]()
     for rounds in range(1, ROUNDS + 1):
         adjustment = adjust_mount(problem, points, settings, gap_s, rough_to)
-        rough_to |= {sensor for sensor, rough in adjustment.rough.items() if rough.shown}
         if not problem.prior.from_start or adjustment.solution.deficiency:
             break
+        if rounds == 1 and (squares := mixed_squares(problem, adjustment, streams)):
+            found += [_of_squares(problem, one) for one in squares]
+            points = streams = without_squares(problem, adjustment, streams, squares)
+            continue  # what they have made rough need not be so
+        rough_to |= {sensor for sensor, rough in adjustment.rough.items() if rough.shown}
         profiles = {sensor: profiles_by_height(problem, adjustment, sensor, points[sensor]) for sensor in points}
         more, off = _not_there(problem, profiles, limits.gates_m), list[Stripe]()
         if not more:
@@ -133,6 +139,12 @@ def adjust_true_faces(
         }
     columns = [column.name for column in LEFT_OUT.columns]
     return adjustment, points, pd.DataFrame([vars(one) for one in found], columns=columns)
+
+
+def _of_squares(problem: CalibrationProblem, squares: Squares) -> LeftOut:
+    family = problem.model.coarse.surfaces[int(problem.model.faces.surface[squares.face])].family
+    heights_m = squares.low_m, squares.high_m
+    return LeftOut(family, "mixed", squares.points, squares.head, *heights_m, value=squares.area_m2)
 
 
 def _of_stripe(problem: CalibrationProblem, stripe: Stripe) -> LeftOut:

@@ -74,6 +74,11 @@ def _words(row: dict[Any, Any]) -> str:
             f"the soundings on {family} are left out ({number}): they lie all over the gate, as where no wall is; look "
             "at what stands there below the water"
         )
+    if row["why"] == "mixed":
+        return (
+            f"the {points} on {row['value']:.1f} m² of {family}, {_heights(row)}, are left out ({number}): in each of "
+            "these squares many lie off the wall, as where a ladder, a fender, a rope or a ledge stands before it"
+        )
     if row["why"] == "step":
         return (
             f"the {points} on {family} {_heights(row)} are left out ({number}): there the wall stands off its plane by "

@@ -21,6 +21,11 @@ SLIP: dict[str, Any] = of_faces(  # a wall with two returns, and a slipway
 CORNER = of_faces({name: SLIP["target"]["faces"][name] for name in ("wall", "north")}, azimuth_deg=163.0)
 UNSURVEYED = {"as_built": {"offset_sigma_m": 0.02, "angle_sigma_deg": 0.1, "bow_sigma_m": 0.005}}
 INS = {"rate_hz": 50.0, "drift": {"horizontal_m": 0.01, "vertical_m": 0.01}}
+LADDER = [  # rungs, and two stiles
+    *({"name": f"rung-{k}", "low_m": [-0.12, 0.8, z], "high_m": [-0.07, 1.2, z + 0.06]}
+      for k, z in enumerate(np.arange(-3.9, -0.2, 0.3).tolist())),
+    *({"name": f"stile-{y}", "low_m": [-0.12, y, -4.0], "high_m": [-0.06, y + 0.08, 1.0]} for y in (0.72, 1.2)),
+]  # fmt: skip
 FOOTING = {"name": "footing", "low_m": [-0.07, -2.0, -4.0], "high_m": [0.0, 4.0, -3.0]}
 
 
@@ -95,6 +100,20 @@ def test_a_footing_is_cut_off_and_the_rest_of_the_wall_is_used(errors_of: Any) -
     assert (row["why"], row["sensor"], row["low_m"]) == ("step", "mbes", None)
     assert -3.1 < row["high_m"] < -2.5
     assert found["adjust/surfaces"].set_index("family").loc["wall", "soundings"] > 1000
+    assert mount_within_its_sigmas(result, errors_of(result["mbes"], session.truth), 4.0)
+
+
+def test_what_stands_before_a_wall_is_left_out_by_squares(errors_of: Any) -> None:
+    """A ladder: echoes of its rungs and the wall together made the whole wall rough, and widened all sigmas."""
+    session, found, result = at(SLIP, {"surroundings": {"back_wall": False, "boxes": LADDER}})
+    (row,) = result["left_out"]
+    assert (row["family"], row["why"], row["sensor"]) == ("wall", "mixed", "mbes")
+    assert 2.0 < found["adjust/left_out"]["value"].iloc[0] < 4.6  # the ladder itself hides 2.1 m²
+    assert row["low_m"] < -3.0 < -1.0 < row["high_m"]
+    assert "as where a ladder" in row["words"]
+    assert "rough_wall" not in result["warning_codes"]
+    kept = found["adjust/residuals"].query("sensor == 'mbes' and face == 0")
+    assert not np.any((kept["y_target_m"] > 0.85) & (kept["y_target_m"] < 1.15) & (kept["residual_m"].abs() > 0.05))
     assert mount_within_its_sigmas(result, errors_of(result["mbes"], session.truth), 4.0)
 
 

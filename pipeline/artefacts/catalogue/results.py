@@ -118,18 +118,21 @@ SETS = Artefact(
     ),
 )
 LEFT_OUT = Artefact(
-    "adjust", "left_out", "table", "unsurveyed faces, or heights of them, whose points are left out; faces in doubt",
+    "adjust", "left_out", "table",
+    "unsurveyed faces, heights or squares of them, whose points are left out; faces in doubt",
     (
         Column("family", TEXT, "", "family of faces"),
-        Column("why", TEXT, "", "few: too few soundings; scatter: they fill the gate; step: they stand off those at "
-               "other heights; off: the others contradict them; doubt: one of these is wrong, and all are used"),
+        Column("why", TEXT, "", "mixed: squares in which many soundings lie off the wall; few: too few soundings; "
+               "scatter: they fill the gate; step: they stand off those at other heights; off: the others contradict "
+               "them; doubt: one of these is wrong, and all are used"),
         Column("points", I64, "", "number of the sensor's points"),
         Column("sensor", TEXT, "", "laser or mbes"),
         Column("low_m", F64, "m", "height above the water from which on they are left out (-inf: from the lowest)"),
         Column("high_m", F64, "m", "height up to which they are (inf: to the highest)"),
         Column("unknown", TEXT, "", "its parameter that is farthest off"),
         Column("value", F64, "rad or m",
-               "by how much, if the other faces are as they are known to be; step: by how much they stand off"),
+               "by how much, if the other faces are as they are known to be; step: by how much they stand off; mixed: "
+               "area of the squares, m²"),
         Column("sigma", F64, "rad or m", "standard deviation of it"),
     ),
 )
