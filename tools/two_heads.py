@@ -3,9 +3,12 @@
 Of each kind of session the program prints mean normalised squared errors with their 99 % bands: of each head (6
 degrees of freedom), of both together (12), and of their difference (6), whose variance hangs on the covariance across
 the heads. The last lines compare this cross-covariance itself. With the Cholesky factors L of the two heads' own
-covariances, the products L₁⁻¹ e₁ (L₂⁻¹ e₂)ᵀ of the errors have the expectation K = L₁⁻¹ C₁₂ L₂⁻ᵀ. Its *share* is the
-mean of ⟨product, K⟩ / ⟨K, K⟩, 1 if C₁₂ is true, 0 if the heads were independent; the largest of the 36 deviations of
-the mean products from K is given in standard errors. Random covariances are judged: no systematic error is drawn.
+covariances, the products L₁⁻¹ e₁ (L₂⁻¹ e₂)ᵀ of the errors have the expectation K = L₁⁻¹ C₁₂ L₂⁻ᵀ. With the mean M of K
+over the sessions its *share* is the mean of ⟨product, M⟩ / ⟨M, M⟩, 1 if C₁₂ is true, 0 if the heads were independent.
+(With K in place of M it would be less than 1 all the same: K = M + d scatters, for each session estimates its own
+figures of the drift, and ⟨K, K⟩ has the mean ⟨M, M⟩ + E ⟨d, d⟩. The part of ⟨M, M⟩ in it is given beside.) The largest
+of the 36 deviations of the mean products from K is given in standard errors. Random covariances are judged: no
+systematic error is drawn.
 
     python -m tools.two_heads [--sessions 200] [--first 0] [--only KIND] [--jobs 2] [--resume]
 """
@@ -110,13 +113,15 @@ def _cross(pairs: list[tuple[Array, Array]]) -> list[str]:
         products.append(np.outer(np.linalg.solve(L_1, e[:6]), np.linalg.solve(L_2, e[6:])))
         stated.append(np.linalg.solve(L_1, np.linalg.solve(L_2, C[:6, 6:].T).T))
     K, off = np.array(stated), np.array(products) - np.array(stated)
-    shares = np.sum(np.array(products) * K, axis=(1, 2)) / np.sum(K**2, axis=(1, 2))
-    count = len(pairs)
+    M, count = K.mean(axis=0), len(pairs)
+    shares = np.sum(np.array(products) * M, axis=(1, 2)) / np.sum(M**2)
+    alike = np.sum(M**2) / np.mean(np.sum(K**2, axis=(1, 2)))
     deviates = off.mean(axis=0) / (off.std(axis=0, ddof=1) / np.sqrt(count))
     limit = float(norm.isf((1 - LEVEL ** (1 / deviates.size)) / 2))
     return [
-        f"  cross-covariance: stated correlations (whitened) up to {np.abs(K.mean(axis=0)).max():.2f}; share found "
-        f"{shares.mean():.2f} ± {shares.std(ddof=1) / np.sqrt(count):.2f} (1 expected)",
+        f"  cross-covariance: stated correlations (whitened) up to {np.abs(M).max():.2f}; of their squares {alike:.2f} "
+        f"alike in all sessions; share found {shares.mean():.2f} ± {shares.std(ddof=1) / np.sqrt(count):.2f} "
+        "(1 expected)",
         f"  worst of 36 entries: {np.abs(deviates).max():.1f} standard errors (limit {limit:.1f})",
     ]
 

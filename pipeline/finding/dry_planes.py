@@ -27,7 +27,7 @@ FEWEST_CELLS, REFITS = 8, 5  # cells of a plane, fits of a plane to its cells
 GROWTH = GrowthLimits(thickness_m=0.03, distance_m=0.06, least_voxels=12)
 SAMPLE = 4000  # points of a plane that are kept for pictures, up to twice as many
 MARGIN_M = 0.1  # of the outline: inside the outermost cells' means
-EDGE_CELL_M, EDGE_MARGIN_M = 0.1, 0.05  # the same of the last outline, where the points are dense enough
+EDGE_CELL_M, EDGE_MARGIN_M = 0.1, 0.02  # the same of the last outline, where the points are dense enough
 BEYOND_M = VOXEL_M + MARGIN_M  # so far outside the first outline the last one may lie
 WAVES_M, OF_HEIGHT = 0.3, 0.25  # above the lowest points: waves, splash, the water's echoes; at most this share
 LEAST_M, BOW_M, COVERED = 1.0, 0.03, 0.6  # extent; bow; share of the cells seen, but for gaps
