@@ -136,7 +136,8 @@ def run(inputs: Inputs, config: Config) -> Outputs:
     found = {"mbes": inputs.provisional_mount, **inputs.mounts_of_further_heads}
     gates_m = {head: float(mount["gate_m"].iloc[0]) for head, mount in found.items() if head in points}
     limits = FaceLimits(gates_m, farthest_correction(config.segment))
-    adjustment, points, left_out = adjust_true_faces(problem, points, config.adjust, config.ingest.max_gap_s, limits)
+    gap_s = config.ingest.max_gap_s
+    adjustment, points, left_out = adjust_true_faces(problem, points, inputs.passes, config.adjust, gap_s, limits)
 
     # Compute the residuals of all points at the adjusted values, and make the tables.
     statistics = residual_statistics(problem, adjustment, points, inputs.passes, config.adjust)

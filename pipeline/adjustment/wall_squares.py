@@ -1,6 +1,6 @@
 """Squares of unsurveyed walls before which something stands: their soundings are left out, and counted.
 
-A reading of all soundings sorts the residuals by face, square and size. Which squares are mixed is said by
+A reading of all soundings sorts the residuals by face, square, pass and size. Which squares are mixed is said by
 :mod:`~pipeline.maths.adjustment.mixed_squares`. The laser's spot is small, so it has none.
 """
 
@@ -9,37 +9,42 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline.adjustment.iteration import MountAdjustment
+from pipeline.adjustment.iteration import MountAdjustment, adjust_mount
 from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
 from pipeline.adjustment.point_sums import summed
 from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.adjustment.residual_places import places_on_surface
+from pipeline.adjustment.weighted_iteration import IterationSettings
 from pipeline.artefacts.streams import Batch, Stream
-from pipeline.maths.adjustment.mixed_squares import mixed
+from pipeline.maths.adjustment.mixed_squares import PassExcess, mixed
 from pipeline.maths.adjustment.parameters import State, kind_of
+from pipeline.maths.geometry.passes import pass_of
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 SIDE_M = 0.25  # of a square
 BINS, OF_SIGMA = 128, 0.5  # of residuals, about zero; width in expected sigmas
+INSIDE = 0.5  # least edge weight of a sounding that is counted
+REACH, PASSES = 1 << 14, 1 << 10  # squares along a face: within ± this many, 4 km; passes that are told apart
 MERGED = 1_000_000  # codes of batches that wait, beyond twice those that are known
-REACH = 1 << 14  # numbers of squares along a face: within ± this many, 4 km
 
 
 @dataclass(frozen=True)
 class Squares:
     """Mixed squares of a face as a head of the sonar sees it.
 
-    code (c,): as :func:`codes_of` gives it; points: soundings in them; low_m, high_m: heights above the water between
-    which they lie.
+    code (c,): as :func:`codes_of` gives it; points: soundings in them; share: of all on the face; low_m, high_m:
+    heights above the water between which they lie.
     """
 
     head: str
     face: int
     code: Integers
     points: int
+    share: float
     low_m: float
     high_m: float
 
@@ -60,7 +65,10 @@ class OutsideSquares:
 
     def __call__(self, batch: Batch) -> Batch:
         """Return the rows that are left."""
-        kept = ~np.isin(codes_of(batch, self.model, self.head, self.state), self.codes)
+        kept = np.ones(len(batch["face"]), dtype=bool)
+        rows = np.flatnonzero(np.isin(batch["face"], self.codes // (2 * REACH) ** 2))
+        some = {name: column[rows] for name, column in batch.items()}
+        kept[rows] = ~np.isin(codes_of(some, self.model, self.head, self.state), self.codes)
         return {name: column[kept] for name, column in batch.items()}
 
 
@@ -75,8 +83,42 @@ def codes_of(batch: Batch, model: ObservationModel, head: str, state: State) -> 
     return np.asarray((face * 2 * REACH + column) * 2 * REACH + row)
 
 
+def adjust_clear_squares(
+    problem: CalibrationProblem,
+    streams: Mapping[str, Stream],
+    passes: pd.DataFrame,
+    settings: IterationSettings,
+    gap_s: float,
+) -> tuple[MountAdjustment, Mapping[str, Stream], list[Squares]]:
+    """Return the adjustment without the soundings in mixed squares, the points it has used, and the squares.
+
+    Parameters
+    ----------
+    problem : CalibrationProblem
+        Model, prior information and consider errors of the calibration.
+    streams : mapping of Stream
+        Labelled points by sensor.
+    passes : DataFrame
+        Table passes.
+    settings : IterationSettings
+        Limits of the iteration, robust weights.
+    gap_s : float
+        A longer time (s) without observations interrupts the knots of the drift.
+    """
+    first = adjust_mount(problem, streams, settings, gap_s)
+    if not problem.prior.from_start or not first.converged:
+        return first, streams, []
+    squares = mixed_squares(problem, first, streams, passes)
+    if squares:
+        left = without_squares(problem, first, streams, squares)
+        adjustment = adjust_mount(problem, left, settings, gap_s)
+        if not adjustment.solution.deficiency:
+            return adjustment, left, squares
+    return first, streams, []
+
+
 def mixed_squares(
-    problem: CalibrationProblem, adjustment: MountAdjustment, streams: Mapping[str, Stream]
+    problem: CalibrationProblem, adjustment: MountAdjustment, streams: Mapping[str, Stream], passes: pd.DataFrame
 ) -> list[Squares]:
     """Return the mixed squares of all upright and sloping faces, by head and face.
 
@@ -88,24 +130,18 @@ def mixed_squares(
         The adjusted values.
     streams : mapping of Stream
         Labelled points by sensor.
+    passes : DataFrame
+        Table passes.
     """
     model, state, found = problem.model, adjustment.state, list[Squares]()
-    for head, stream in streams.items():
-        if kind_of(head) != "mbes":
-            continue
-        code, number = _merged(stream.fold(_counted, model, head, adjustment.values))
-        square, row = np.unique(code // BINS, return_inverse=True)
-        face_of = square // (2 * REACH) ** 2
+    times_ns = passes["start_ns"].to_numpy(), passes["end_ns"].to_numpy()
+    for head in (name for name in streams if kind_of(name) == "mbes"):
+        code, number = _merged(streams[head].fold(_counted, model, head, adjustment.values, times_ns))
+        face_of = code // (PASSES * BINS * (2 * REACH) ** 2)
         for face in np.unique(face_of).tolist():
-            if state.surfaces[int(model.faces.surface[face])].level:
-                continue
             first, last = np.searchsorted(face_of, [face, face + 1])
-            count, ours = np.zeros((last - first, BINS), dtype=np.int64), (row >= first) & (row < last)
-            count[row[ours] - first, code[ours] % BINS] = number[ours]
-            is_mixed = mixed(_places(square[first:last]), count)
-            if is_mixed.any():
-                codes, points = square[first:last][is_mixed], int(count[is_mixed].sum())
-                found.append(Squares(head, face, codes, points, *_heights_m(codes, model, face, state)))
+            if not state.surfaces[int(model.faces.surface[face])].level:
+                found += _of_face(model, state, (head, face), code[first:last], number[first:last])
     return found
 
 
@@ -122,13 +158,19 @@ def without_squares(
     }
 
 
-def _counted(batch: Batch, model: ObservationModel, head: str, values: CurrentValues) -> tuple[Integers, Integers]:
-    """Return the codes of squares and bins of residuals, ascending, and the number of soundings of each."""
+def _counted(
+    batch: Batch, model: ObservationModel, head: str, values: CurrentValues, times_ns: tuple[Integers, Integers]
+) -> tuple[Integers, Integers]:
+    """Return the codes of squares, passes and bins of residuals, ascending, and the number of soundings of each."""
     observed = summed(batch, model, head, values, residuals=True)
-    v_m, _, _, weight, _, _ = observed.observed
-    bin_ = np.floor(v_m * np.sqrt(weight) / OF_SIGMA) + BINS // 2
-    code = codes_of(observed.points, model, head, values.state) * BINS + np.clip(bin_, 0, BINS - 1).astype(np.int64)
-    return np.unique(code, return_counts=True)
+    edge_weight = np.asarray(observed.points["edge_weight"], dtype=np.float64)
+    inside = edge_weight >= INSIDE
+    points = {name: column[inside] for name, column in observed.points.items()}
+    v_m, _, _, weight, _, _ = observed.observed[:, inside]
+    bin_ = np.floor(v_m * np.sqrt(weight / edge_weight[inside]) / OF_SIGMA) + BINS // 2
+    run = np.minimum(pass_of(points["t_ns"], *times_ns).astype(np.int64) + 1, PASSES - 1)
+    code = (codes_of(points, model, head, values.state) * PASSES + run) * BINS
+    return np.unique(code + np.clip(bin_, 0, BINS - 1).astype(np.int64), return_counts=True)
 
 
 def _merged(pieces: Iterable[tuple[Integers, Integers]]) -> tuple[Integers, Integers]:
@@ -149,15 +191,24 @@ def _together(pieces: Sequence[tuple[Integers, Integers]]) -> tuple[Integers, In
     return code, np.bincount(row, numbers, len(code)).astype(np.int64)
 
 
-def _places(codes: Integers) -> Integers:
-    """Return column and row (c, 2) of squares on their face."""
-    return np.asarray(np.stack([codes // (2 * REACH) % (2 * REACH), codes % (2 * REACH)], axis=1) - REACH)
-
-
-def _heights_m(codes: Integers, model: ObservationModel, face: int, state: State) -> tuple[float, float]:
-    """Return the heights above the water between which squares of a face lie."""
-    surface = state.surfaces[int(model.faces.surface[face])]
-    corners = [_places(codes) + corner for corner in product((0, 1), repeat=2)]
-    z = SIDE_M * np.concatenate(corners) @ surface.tangents[:, 2]
-    z += surface.centre_m[2] - model.wet_heights_m[1]
-    return float(z.min()), float(z.max())
+def _of_face(
+    model: ObservationModel, state: State, seen: tuple[str, int], code: Integers, number: Integers
+) -> list[Squares]:
+    """Return the mixed squares of a face as a head has ``seen`` it, from codes (n,) and their numbers; or nothing."""
+    squares, row = np.unique(code // (PASSES * BINS), return_inverse=True)
+    soundings, run = np.bincount(row, number).astype(np.int64), code // BINS % PASSES
+    passes = []
+    for each in np.unique(run).tolist():
+        mine, count = run == each, np.zeros((len(squares), BINS), dtype=np.int64)
+        count[row[mine], code[mine] % BINS] = number[mine]
+        passes.append(PassExcess.of(count))
+    place = np.stack([squares // (2 * REACH) % (2 * REACH), squares % (2 * REACH)], axis=1) - REACH
+    is_mixed = mixed(place, soundings, passes)
+    if not is_mixed.any():
+        return []
+    surface = state.surfaces[int(model.faces.surface[seen[1]])]
+    corners = SIDE_M * np.concatenate([place[is_mixed] + corner for corner in product((0, 1), repeat=2)])
+    off_m = surface.shift_m + model.height_of_face[seen[1]]
+    z = corners @ surface.tangents[:, 2] + surface.centre_m[2] + off_m * surface.normal[2] - model.wet_heights_m[1]
+    points = int(soundings[is_mixed].sum())
+    return [Squares(*seen, squares[is_mixed], points, points / soundings.sum(), float(z.min()), float(z.max()))]

@@ -43,6 +43,7 @@ AT_END = 6  # heights at either end of a face that may be off together
 CERTAIN = 5.0  # sigmas by which a height must be off the line
 JOINED_BINS = 3  # stripes with fewer good heights between them are one, and reach to the end of the face
 BESIDE_M = 0.15  # by which a stripe is made wider
+LEAST_SHARE = 0.05  # of the usual number of points: a height with fewer shows what a cut has left
 
 
 @dataclass(frozen=True)
@@ -183,6 +184,8 @@ def stripes_of_face(
     bow : (float, float)
         The estimated bow b, and the depth of the faces' lower end, m.
     """
+    least = LEAST_SHARE * float(np.median([mean.count for mean in means]))
+    means = [mean for mean in means if mean.count >= least]
     number, value, sigma = profile_of(means)
     count = np.array([mean.count for mean in means])
     up = np.clip(1 + (number + 0.5) * BIN_M / bow[1], 0.0, 1.0)

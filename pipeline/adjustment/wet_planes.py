@@ -28,7 +28,7 @@ from pipeline.adjustment.face_errors import FinalSolution
 from pipeline.adjustment.iteration import MountAdjustment, adjust_mount
 from pipeline.adjustment.parameter_strengths import parameter_tests
 from pipeline.adjustment.problem import CalibrationProblem
-from pipeline.adjustment.wall_squares import Squares, mixed_squares, without_squares
+from pipeline.adjustment.wall_squares import Squares, adjust_clear_squares
 from pipeline.adjustment.wall_stripes import OutsideStripes, Stripe, profiles_by_height, stripes_off
 from pipeline.artefacts.catalogue.results import LEFT_OUT
 from pipeline.artefacts.streams import Stream
@@ -68,7 +68,7 @@ class LeftOut:
     family; why: "mixed", "few", "scatter", "step" or "off", or "doubt" if it is not left out; points: their number;
     sensor: that saw them; low_m, high_m: heights above the water, infinite at the ends of the face. unknown, value,
     sigma: the wet face's parameter that is farthest off, rad or m; of a stripe value is what it stands off by, m, of
-    mixed squares their area, m²; otherwise "" and NaN.
+    mixed squares their area, m², with their share of the soundings as sigma; otherwise "" and NaN.
     """
 
     family: str
@@ -90,6 +90,7 @@ class LeftOut:
 def adjust_true_faces(
     problem: CalibrationProblem,
     streams: Mapping[str, Stream],
+    passes: pd.DataFrame,
     settings: Adjust,
     gap_s: float,
     limits: FaceLimits,
@@ -102,6 +103,8 @@ def adjust_true_faces(
         Model, prior information and consider errors of the calibration.
     streams : mapping of Stream
         Labelled points by sensor.
+    passes : DataFrame
+        Table passes.
     settings : Adjust
         Limits of the iteration, robust weights, level of the tests.
     gap_s : float
@@ -109,16 +112,13 @@ def adjust_true_faces(
     limits : FaceLimits
         Of the labels, and of the mount.
     """
-    points, found, stripes, rough_to = dict(streams), list[LeftOut](), list[Stripe](), set[str]()
+    adjustment, streams, squares = adjust_clear_squares(problem, streams, passes, settings, gap_s)
+    points, found = dict(streams), [_of_squares(problem, one) for one in squares]
+    stripes, rough_to = list[Stripe](), set[str]()
     for rounds in range(1, ROUNDS + 1):
-        adjustment = adjust_mount(problem, points, settings, gap_s, rough_to)
+        rough_to |= {sensor for sensor, rough in adjustment.rough.items() if rough.shown}
         if not problem.prior.from_start or adjustment.solution.deficiency:
             break
-        if rounds == 1 and (squares := mixed_squares(problem, adjustment, streams)):
-            found += [_of_squares(problem, one) for one in squares]
-            points = streams = without_squares(problem, adjustment, streams, squares)
-            continue  # what they have made rough need not be so
-        rough_to |= {sensor for sensor, rough in adjustment.rough.items() if rough.shown}
         profiles = {sensor: profiles_by_height(problem, adjustment, sensor, points[sensor]) for sensor in points}
         more, off = _not_there(problem, profiles, limits.gates_m), list[Stripe]()
         if not more:
@@ -137,20 +137,23 @@ def adjust_true_faces(
             sensor: stream.changed(OutsideStripes(problem.model, state, sensor, cuts))
             for sensor, stream in streams.items()
         }
+        adjustment = adjust_mount(problem, points, settings, gap_s, rough_to)
     columns = [column.name for column in LEFT_OUT.columns]
     return adjustment, points, pd.DataFrame([vars(one) for one in found], columns=columns)
 
 
 def _of_squares(problem: CalibrationProblem, squares: Squares) -> LeftOut:
-    family = problem.model.coarse.surfaces[int(problem.model.faces.surface[squares.face])].family
-    heights_m = squares.low_m, squares.high_m
-    return LeftOut(family, "mixed", squares.points, squares.head, *heights_m, value=squares.area_m2)
+    family, place = _family(problem, squares.face), (squares.head, squares.low_m, squares.high_m)
+    return LeftOut(family, "mixed", squares.points, *place, value=squares.area_m2, sigma=squares.share)
 
 
 def _of_stripe(problem: CalibrationProblem, stripe: Stripe) -> LeftOut:
-    family = problem.model.coarse.surfaces[int(problem.model.faces.surface[stripe.face])].family
     heights_m = stripe.low_m, stripe.high_m
-    return LeftOut(family, "step", stripe.points, stripe.sensor, *heights_m, value=stripe.off_m)
+    return LeftOut(_family(problem, stripe.face), "step", stripe.points, stripe.sensor, *heights_m, value=stripe.off_m)
+
+
+def _family(problem: CalibrationProblem, face: int) -> str:
+    return problem.model.coarse.surfaces[int(problem.model.faces.surface[face])].family
 
 
 def _whole_faces(problem: CalibrationProblem, left_out: Sequence[LeftOut]) -> Iterator[Stripe]:

@@ -78,7 +78,7 @@ class ReasonCode(StrEnum):
     TARGET_OFF_ORIGIN = "target_off_origin", "the target stands far from target.origin, or out of plumb"
     WATER_CONTRADICTED = "water_contradicted", "the boat's height contradicts target.water_by_time"
     TARGET_FOUND = "target_found", "the target was found in laser points, and its faces go on below the water unproven"
-    FACE_LEFT_OUT = "face_left_out", "soundings on a face are left out: below the water it does not go on as above"
+    FACE_LEFT_OUT = "face_left_out", "soundings on a face are left out: it is not as above, or a thing stands before it"
     UNSEEN_FACE_ERROR = "unseen_face_error", "a wall could be off below the water unnoticed, and the mount be wrong"
     ROUGH_WALL = "rough_wall", "patches of the walls stand off their planes, and the sigmas allow for it"
     PASS_WITHOUT_SOUNDINGS = "pass_without_soundings", "in some passes the laser alone saw the target"

@@ -231,9 +231,9 @@ REMEDIES: dict[Code, Remedy] = {
         "(target.strike). Look at the residuals by height, and state in as_built how the walls may stand there.",
     ),
     Code.FACE_LEFT_OUT: Remedy(
-        "Below the water a wall is not the plane that it is above: a ledge, a footing, a bulge, growth; or near the "
-        "water something stands before it, or splash. The points there are left out, and the rest is adjusted without "
-        "them.",
+        "Below the water a wall is not the plane that it is above: a ledge, a footing, a bulge, growth; or something "
+        "stands before it, such as a ladder; or near the water there is splash. The points there are left out, and the "
+        "rest is adjusted without them.",
         "See what is there, at low water or with a camera. If the sigmas are too large without it, pass more walls.",
     ),
     Code.UNSEEN_FACE_ERROR: Remedy(

@@ -49,13 +49,14 @@ def faces_in_doubt(left_out: pd.DataFrame) -> list[Statement]:
 
 
 def left_out_block(left_out: pd.DataFrame) -> dict[str, Any]:
-    """Return the block ``left_out`` of calibration.json, a row for each face or stripe of it; empty if there is none.
+    """Return the block ``left_out`` of calibration.json, a row for each face, stripe or squares of it; or nothing.
 
     Heights are m above the water, null at the end of the face.
     """
     rows = [
         {"family": row["family"], "why": row["why"], "sensor": row["sensor"], "points": int(row["points"])}
         | {name: json_number(row[name]) for name in ("low_m", "high_m")}
+        | ({"area_m2": json_number(row["value"]), "share": json_number(row["sigma"])} if row["why"] == "mixed" else {})
         | {"words": _words(row)}
         for row in left_out[left_out["why"] != "doubt"].to_dict("records")
     ]
@@ -76,8 +77,9 @@ def _words(row: dict[Any, Any]) -> str:
         )
     if row["why"] == "mixed":
         return (
-            f"the {points} on {row['value']:.1f} m² of {family}, {_heights(row)}, are left out ({number}): in each of "
-            "these squares many lie off the wall, as where a ladder, a fender, a rope or a ledge stands before it"
+            f"the {points} on {row['value']:.1f} m² of {family}, {_heights(row)}, are left out ({number}, "
+            f"{100 * row['sigma']:.0f} % of those on it): pass after pass many of a square lie to one side, as where a "
+            "ladder, a rope or a ledge stands before the wall; the map of the residuals shows where"
         )
     if row["why"] == "step":
         return (

@@ -1,5 +1,6 @@
 """Stripes of height that are left out: found on both sides of their tolerances, and cut where they are."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -59,6 +60,14 @@ def test_a_bow_that_follows_a_footing_does_not_hide_it() -> None:
 
 def test_a_wall_that_is_truly_bowed_has_no_stripe() -> None:
     assert stripes_of_face(("mbes", 2), profile({}), (TOLERANCE_M, 0.0), (0.02, 4.0)) == []
+
+
+@pytest.mark.parametrize(("points", "found"), [(4, 0), (5, 1)])
+def test_what_a_cut_has_left_of_a_height_is_no_stripe(points: int, found: int) -> None:
+    """Of a hundred points at other heights."""
+    means = profile({-40: 0.05})
+    means[0] = replace(means[0], count=points)
+    assert len(stripes_of_face(("mbes", 2), means, (TOLERANCE_M, 0.0), (0.0, 4.0))) == found
 
 
 def test_growth_near_the_water_is_cut_to_the_water() -> None:

@@ -108,7 +108,8 @@ def test_what_stands_before_a_wall_is_left_out_by_squares(errors_of: Any) -> Non
     session, found, result = at(SLIP, {"surroundings": {"back_wall": False, "boxes": LADDER}})
     (row,) = result["left_out"]
     assert (row["family"], row["why"], row["sensor"]) == ("wall", "mixed", "mbes")
-    assert 2.0 < found["adjust/left_out"]["value"].iloc[0] < 4.6  # the ladder itself hides 2.1 m²
+    assert 2.1 < row["area_m2"] < 6.5  # the ladder hides 2.1 m², and with a square on each side 4.5
+    assert 0.1 < row["share"] < 0.3
     assert row["low_m"] < -3.0 < -1.0 < row["high_m"]
     assert "as where a ladder" in row["words"]
     assert "rough_wall" not in result["warning_codes"]

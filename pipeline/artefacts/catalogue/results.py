@@ -133,7 +133,7 @@ LEFT_OUT = Artefact(
         Column("value", F64, "rad or m",
                "by how much, if the other faces are as they are known to be; step: by how much they stand off; mixed: "
                "area of the squares, m²"),
-        Column("sigma", F64, "rad or m", "standard deviation of it"),
+        Column("sigma", F64, "rad or m", "standard deviation of it; mixed: their share of the face's soundings"),
     ),
 )
 SURFACES = Artefact(

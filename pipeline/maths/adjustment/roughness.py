@@ -18,6 +18,10 @@ all passes, and errors of the pass (noise, drift), which are not. So for two pas
 The mean over blocks and pairs of passes is the estimate of V. Each pass is first freed of a line in y, which drift may
 give it and surfaces' parameters take up; of n blocks this takes 2 degrees of freedom, so V counts n / (n - 2) times.
 
+A line that covers a part of the height alone has the mean and the slope of the wall's shape there (a bow, the water's
+refraction): where a ledge hides the rest, all passes see this alike. So lines whose heights have less than half of the
+variance that is usual in their pass say nothing of V.
+
 A test says whether V is certain (:mod:`~pipeline.maths.adjustment.rough_blocks`). On a wall with too few blocks for it,
 what makes roughness likely holds for this wall.
 
@@ -58,6 +62,7 @@ from pipeline.maths.adjustment.rough_blocks import SIZES_M, OfBlocks, PlacedLine
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
+COVERING = 0.5  # of the usual variance of a line's heights: with less it covers a part of them
 OF_PLACE = 8  # degrees of freedom that the place's roughness counts as
 
 
@@ -137,6 +142,8 @@ def roughness(
         along, total = _along(place[rows]), lines.total[rows].sum()
         per_length[number] = total / max(float(np.ptp(along)), SIZES_M[0])
         height_m[number] = max(float(np.sqrt(12 * lines.spread[rows].sum() / total)), SIZES_M[0])
+        whole = covering(lines.spread[rows] / lines.total[rows], run[rows])
+        rows, along = rows[whole], along[whole]
         means = PlacedLines(lines.mean[rows], lines.total[rows], along, run[rows]).by_size(len(walls))
         dof[number], slopes = means[0].dof, [OfBlocks()] * len(SIZES_M)
         sloping = lines.sloping[rows]
@@ -199,6 +206,13 @@ def _runs(record: Integers, seconds: Array, gap_s: float) -> Integers:
     """Return the number (g,) of the pass of each interval: passes are apart by more than ``gap_s``."""
     known, inverse = np.unique(record, return_inverse=True)
     return np.concatenate([[0], np.cumsum(np.diff(seconds[known]) > gap_s)])[inverse]
+
+
+def covering(variance_m2: Array, run: Integers) -> NDArray[np.bool_]:
+    """Return which lines (n,) cover the heights that are usual in their pass, by the variance of their heights."""
+    numbers, inverse = np.unique(run, return_inverse=True)
+    usual = np.array([np.median(variance_m2[inverse == k]) for k in range(len(numbers))])
+    return np.asarray(variance_m2 >= COVERING * usual[inverse])
 
 
 def _places(

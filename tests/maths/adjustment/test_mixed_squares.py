@@ -1,92 +1,145 @@
-"""Squares that are mixed: told from chance, from bad water, and from walls that are turned, bowed or rough."""
+"""Squares that are mixed: told from chance, from noise, from bad pings and passes, and from walls that are turned."""
 
 import numpy as np
 import pytest
 
-from pipeline.maths.adjustment import mixed_squares
+from pipeline.maths.adjustment.mixed_squares import PassExcess, mixed
 
 BINS, MIDDLE, SIGMA = 128, 64.0, 2.0  # sigma in bins
+SQUARES, SOUNDINGS, PASSES = 100, 30, 3
+Counts = list[np.ndarray]  # of each pass, by square and bin
 
 
-def mixed(count: np.ndarray) -> np.ndarray:
-    """The same of squares that do not touch."""
-    return mixed_squares.mixed(np.column_stack([3 * np.arange(len(count)), np.zeros(len(count), dtype=int)]), count)
-
-
-def counts(
-    *, squares: int = 100, soundings: int = 60, at: float = MIDDLE, sigma: float = SIGMA, seed: int = 5
-) -> np.ndarray:
-    """Squares with normal residuals about a place."""
-    rng = np.random.default_rng(seed)
-    bins = np.clip(rng.normal(at, sigma, (squares, soundings)).astype(int), 0, BINS - 1)
+def binned(residuals: np.ndarray) -> np.ndarray:
+    """Numbers by square and bin of residuals (squares, soundings), in sigmas."""
+    bins = np.clip(np.floor(MIDDLE + SIGMA * residuals).astype(int), 0, BINS - 1)
     return np.array([np.bincount(of_square, minlength=BINS) for of_square in bins])
 
 
-def beside(count: np.ndarray, soundings: int, off: float = 10 * SIGMA) -> np.ndarray:
-    """Some of the soundings of the first square come from something that stands before the wall."""
-    changed = count.copy()
-    taken = np.cumsum(changed[0])
-    changed[0] = np.diff(np.minimum(taken, taken[-1] - soundings), prepend=0)
-    changed[0, int(MIDDLE + off)] += soundings
-    return changed
+def noise(*, squares: int = SQUARES, soundings: int = SOUNDINGS, seed: int = 5) -> np.ndarray:
+    """Residuals of a clean wall by pass, square and sounding, in sigmas."""
+    return np.random.default_rng(seed).normal(size=(PASSES, squares, soundings))
+
+
+def named(residuals: np.ndarray, place: np.ndarray | None = None) -> list[int]:
+    """Numbers of the squares that are mixed; without places, squares that do not touch."""
+    counts = [binned(of_pass) for of_pass in residuals]
+    number = np.arange(len(counts[0]))
+    place = np.column_stack([3 * number, 0 * number]) if place is None else place
+    soundings = np.sum([count.sum(axis=1) for count in counts], axis=0)
+    return np.flatnonzero(mixed(place, soundings, [PassExcess.of(count) for count in counts])).tolist()
 
 
 def test_a_clean_wall_has_no_mixed_square() -> None:
-    assert not mixed(counts(squares=2000)).any()
+    assert named(noise(squares=3000)) == []
 
 
-@pytest.mark.parametrize(("soundings", "off", "is_mixed"), [
-    (9, 10.0, True),  # a tenth of 60, and chance's share, and a bit
-    (7, 10.0, False),
-    (9, -10.0, True),
-    (15, 3.0, False),  # within 4 sigmas
-    (40, 10.0, True),  # most of them: the rest is off
-])  # fmt: skip
-def test_a_square_with_another_thing_before_it_is_mixed(soundings: int, off: float, is_mixed: bool) -> None:
-    found = mixed(beside(counts(), soundings, off * SIGMA))
-    assert found[0] == is_mixed
-    assert not found[1:].any()
+@pytest.mark.parametrize(
+    ("share", "off", "is_mixed"),
+    [
+        (0.2, 10.0, True),
+        (0.2, -10.0, True),
+        (0.07, 10.0, False),  # a tenth more than usual is wanted
+        (0.2, 3.0, False),  # within 4 sigmas
+        (0.7, 10.0, True),  # most of them: those on the wall are the rest
+        (1.0, 10.0, False),  # all of them: the square stands off
+    ],
+)
+def test_a_square_with_a_thing_before_it_is_mixed(share: float, off: float, is_mixed: bool) -> None:
+    wall = noise()
+    wall[:, 7, : round(share * SOUNDINGS)] += off
+    assert named(wall) == [7] * is_mixed
 
 
-@pytest.mark.parametrize(("of", "off", "is_mixed"), [(7, 3, False), (8, 2, False), (8, 4, True), (10, 3, False)])
-def test_of_few_soundings_more_must_be_off(of: int, off: int, is_mixed: bool) -> None:
-    """Two of eight are a quarter, and chance; of seven nothing is said."""
-    few = counts(squares=1, soundings=of)
-    assert mixed(np.vstack([beside(few, off), counts()]))[0] == is_mixed
+@pytest.mark.parametrize(("passes", "is_mixed"), [(1, False), (2, True), (3, True)])
+def test_most_passes_must_see_it(passes: int, is_mixed: bool) -> None:
+    """One pass alone: a fish, a bad ping, an echo of the boat."""
+    wall = noise()
+    wall[:passes, 7, :15] += 10.0
+    assert named(wall) == [7] * is_mixed
+
+
+def test_passes_must_see_it_on_the_same_side() -> None:
+    wall = noise()
+    wall[0, 7, :15] += 10.0
+    wall[1, 7, :12] -= 10.0
+    assert named(wall) == []
+
+
+def test_a_square_that_one_pass_alone_sees_is_not_judged() -> None:
+    wall = noise()[:1]
+    wall[0, 7, :15] += 10.0
+    assert named(wall) == []
+
+
+@pytest.mark.parametrize(("soundings", "is_mixed"), [(7, False), (8, True)])
+def test_few_soundings_of_a_pass_say_nothing(soundings: int, is_mixed: bool) -> None:
+    few = noise(soundings=soundings)
+    few[:, 7, :4] += 10.0
+    assert named(few) == [7] * is_mixed
+
+
+@pytest.mark.parametrize("times", [2.0, 3.0, 4.0, 8.0])
+def test_a_part_of_the_wall_that_is_noisier_has_none(times: float) -> None:
+    """As the outer beams, or a grazing view: noise is off to both sides."""
+    wall = noise(squares=400)
+    wall[:, :160] *= times
+    assert len(named(wall)) <= 1
 
 
 def test_water_with_outliers_everywhere_has_none() -> None:
-    rng = np.random.default_rng(2)
-    clean, wild = counts(soundings=40), rng.integers(0, BINS, (100, 20))
-    everywhere = clean + np.array([np.bincount(of_square, minlength=BINS) for of_square in wild])
-    assert not mixed(everywhere).any()
-    assert mixed(np.vstack([everywhere[:1], clean[1:]])).tolist() == [True, *[False] * 99]
+    wall, rng = noise(), np.random.default_rng(2)
+    wall[:, :, :10] = rng.uniform(-30, 30, size=(PASSES, SQUARES, 10))
+    assert named(wall) == []
 
 
-def test_a_square_that_stands_off_as_a_whole_is_not_mixed() -> None:
-    """As on a wall that is turned, bowed or rough: that is for the tests of the plane."""
-    whole = np.vstack([counts(squares=20, at=at, seed=int(at)) for at in (40.0, 52.0, 64.0, 76.0, 90.0)])
-    assert not mixed(whole).any()
+def test_bad_pings_are_mostly_not_taken_for_things() -> None:
+    """Of the pings 5 % measure 10 sigmas too far; 10 soundings of a ping, 3 pings of a pass lie in a square."""
+    wall, rng = noise(squares=1000), np.random.default_rng(3)
+    wall += np.repeat(10.0 * (rng.uniform(size=(PASSES, 1000, 3)) < 0.05), 10, axis=2)
+    assert len(named(wall)) < 60  # where two of three passes have one in it, 5 %; by soundings alone it were 27 %
 
 
-def test_a_square_that_is_noisier_than_usual_is_not_mixed() -> None:
-    """Far away or at a grazing view; but not four times as noisy."""
-    assert not mixed(np.vstack([counts(squares=1, sigma=2 * SIGMA), counts()])).any()
-    assert mixed(np.vstack([counts(squares=1, sigma=4 * SIGMA), counts()]))[0]
+def test_passes_that_contradict_one_another_make_none() -> None:
+    wall = noise()
+    wall[1, 40:] += 6.0
+    wall[2] -= 15.0
+    assert named(wall) == []
 
 
-def test_too_few_squares_or_soundings_say_nothing() -> None:
-    assert not mixed(beside(counts(squares=3), 30)).any()
-    assert mixed(beside(counts(squares=4), 30)).tolist() == [True, False, False, False]
-    assert not mixed(np.zeros((5, BINS), dtype=int)).any()
+def test_squares_that_stand_off_as_a_whole_are_not_mixed() -> None:
+    """As on a wall that is turned or bowed, within the bins and beyond: that is for the tests of the plane."""
+    assert named(noise() + np.linspace(-60, 60, SQUARES)[:, None]) == []
 
 
-def test_beside_a_mixed_square_half_as_much_is_enough() -> None:
-    """A thing ends 5 of 60 soundings into the next square. Farther away so many are chance."""
-    wall = beside(counts(), 20)
-    wall[[1, 2]] = beside(counts(squares=1), 5)[0]
-    at = np.column_stack([np.arange(-50, 50), np.full(100, 7)])
-    assert np.flatnonzero(mixed_squares.mixed(at, wall)).tolist() == [0, 1]
-    corner = at + np.array([[0, 1]]) * (np.arange(100) == 1)[:, None]
-    assert np.flatnonzero(mixed_squares.mixed(corner, wall)).tolist() == [0, 1]
-    assert np.flatnonzero(mixed_squares.mixed(corner + corner * [[0, 1]], wall)).tolist() == [0]
+def test_those_beside_a_mixed_square_are_left_out_with_it() -> None:
+    wall = noise()
+    wall[:, 44, :10] += 10.0
+    number = np.arange(SQUARES)
+    assert named(wall, np.column_stack([number // 10 - 5, number % 10 - 5])) == [34, 43, 44, 45, 54]
+    assert named(wall, np.column_stack([number, number % 7])) == [44]  # those touch at corners
+
+
+@pytest.mark.parametrize(("squares", "is_mixed"), [(45, True), (55, False)])
+def test_where_half_a_face_would_go_no_thing_explains_it(squares: int, is_mixed: bool) -> None:
+    """Things on 45 squares; with 55 the usual share is that of the things."""
+    wall = noise()
+    wall[:, :squares, :10] += 10.0
+    assert named(wall) == list(range(squares)) * is_mixed
+
+
+def test_the_usual_square_is_that_of_the_soundings() -> None:
+    """Sixty sparse squares at the rim, of less noise, do not make the forty of the wall noisy."""
+    wall = noise(soundings=300)
+    counts = []
+    for of_pass in wall:
+        count = binned(of_pass)
+        count[:60] = binned(0.2 * of_pass[:60, :9])
+        counts.append(PassExcess.of(count))
+    assert not any(np.any(np.abs(one.excess[60:]) > 3) for one in counts)
+
+
+def test_too_few_squares_say_nothing() -> None:
+    wall = noise(squares=3)
+    wall[:, 0, :10] += 10.0
+    assert named(wall) == []

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.maths.adjustment.rough_blocks import SIZES_M, PlacedLines
-from pipeline.maths.adjustment.roughness import OF_PLACE, Walls
+from pipeline.maths.adjustment.roughness import OF_PLACE, Walls, covering
 
 Array = np.ndarray
 LENGTH_M, PINGS, PASSES = 12.0, 300, 4
@@ -208,3 +208,11 @@ def test_a_place_that_was_rough_with_more_walls_stays_rough() -> None:
     again = walls.roughness(shown=True)
     assert (again.added > 1.0).all()
     assert again.shown
+
+
+def test_lines_that_cover_a_part_of_the_height_are_told_pass_by_pass() -> None:
+    """The second pass covers half of the height that the first does; in each a ledge hides some more."""
+    heights_m = np.array([4.0, 4.0, 2.7, 4.0, 3.0, 2.0, 2.0, 1.5, 1.2, 2.0])
+    runs = np.repeat([3, 7], 5)
+    told = covering(heights_m**2 / 12, runs)
+    assert told.tolist() == [True, True, False, True, True, True, True, True, False, True]
