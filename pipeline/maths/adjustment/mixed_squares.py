@@ -24,8 +24,8 @@ Amid a thing an echo comes from anywhere between it and the wall, and soundings 
 grows: those beside it that have a tenth more off than usual, to whatever side, belong to it, up to 3 squares away; and
 then all that lie beside these, for a thing does not end where a square does.
 
-If all these squares hold more than half of a face's soundings, no single thing explains them, and
-none is left out: the tests of noise and of residuals speak.
+If all these squares hold more than half of the soundings of a face, no single thing explains them, and none is left
+out: the tests of noise and of residuals speak.
 """
 
 from collections.abc import Iterable

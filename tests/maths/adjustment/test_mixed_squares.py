@@ -120,6 +120,17 @@ def test_those_beside_a_mixed_square_are_left_out_with_it() -> None:
     assert named(wall, np.column_stack([number, number % 7])) == [44]  # those touch at corners
 
 
+def test_amid_a_thing_soundings_are_off_to_both_sides() -> None:
+    """Its edge is at square 20: three squares beyond belong to it, one lies beside them. Noise alone begins none."""
+    wall = noise()
+    wall[:, 20, :10] += 10.0
+    for both in (slice(21, 26), slice(60, 70)):
+        wall[:, both, :10] += 10.0
+        wall[:, both, 10:20] -= 10.0
+    number = np.arange(SQUARES)
+    assert named(wall, np.column_stack([number, 0 * number])) == [19, 20, 21, 22, 23, 24]
+
+
 @pytest.mark.parametrize(("squares", "is_mixed"), [(45, True), (55, False)])
 def test_where_half_a_face_would_go_no_thing_explains_it(squares: int, is_mixed: bool) -> None:
     """Things on 45 squares; with 55 the usual share is that of the things."""
