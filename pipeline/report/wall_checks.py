@@ -122,7 +122,8 @@ def _heights(row: dict[Any, Any]) -> str:
 
 
 def rough_walls(groups: pd.DataFrame) -> Iterator[Statement]:
-    """Yield a warning for each sensor to which walls are rough (table ``groups``)."""
+    """Yield a warning for each sensor to which walls are rough (table ``groups``); bottoms are none."""
+    groups = groups[groups["family"].isin(groups["family"][groups["sensor"] == "laser"])]
     for sensor, of_sensor in groups.groupby("sensor", sort=True):
         rows, where = of_sensor[of_sensor["patch_m"] >= LEAST_PATCH_M], SEEN_BY[kind_of(str(sensor))]
         walls = ", ".join(f"{row['family']} by {1000 * row['patch_m']:.0f} mm" for row in rows.to_dict("records"))

@@ -71,5 +71,13 @@ def test_a_wall_is_rough_from_a_millimetre_on(patch_m: float, said: bool) -> Non
 
 def test_a_further_head_names_itself() -> None:
     row = dict.fromkeys(column.name for column in GROUPS.columns) | {"sensor": "mbes_2", "family": "P2"}
-    (found,) = rough_walls(pd.DataFrame([row | {"patch_m": 0.004}]))
+    of_laser = row | {"sensor": "laser", "patch_m": 0.0}
+    (found,) = rough_walls(pd.DataFrame([row | {"patch_m": 0.004}, of_laser]))
     assert found.words.startswith("mbes_2: below the water, patches of the walls")
+
+
+def test_a_bottom_is_no_rough_wall() -> None:
+    row = dict.fromkeys(column.name for column in GROUPS.columns) | {"patch_m": 0.004}
+    seen = [("mbes", "wall-1"), ("mbes", "bottom-1"), ("laser", "wall-1")]
+    found = rough_walls(pd.DataFrame([row | {"sensor": sensor, "family": family} for sensor, family in seen]))
+    assert ["bottom" in one.words for one in found] == [False, False]

@@ -12,7 +12,7 @@ from pipeline.mount import WITHIN_95
 from pipeline.report.sigma_sources import NOISE
 from pipeline.results.pages.mount_tables import Quantity
 
-NOISE_LIMITS = ("the noise of the sensors and the INS", "more passes make it smaller")
+NOISE_LIMITS = ("the noise of the sensors and the INS", "more passes make it smaller, on rough walls more walls")
 CAUSES = {  # by the beginning of the parameters' names (ERROR_SOURCES): the source in a sentence, and the remedy
     "laser_rotation": ("the angles of the laser's own mount", "calibrate the laser better (poolcal laser)"),
     "laser_lever_arm": ("the lever arm of the laser's own mount", "calibrate the laser better, or survey it again"),
