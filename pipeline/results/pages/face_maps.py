@@ -24,6 +24,7 @@ LEFT_IN, RIGHT_IN, BOTTOM_IN, HIGHEST_IN = 0.65, 0.95, 0.45, 2.2  # margins and 
 GAP_IN, TICKS_IN, TITLE_IN = 0.26, 0.5, 0.3  # between panels; before one with numbers of its own; above
 NARROWEST_IN, LOWEST_IN, FLAT_IN = 0.6, 1.1, 1.0  # panels: narrowest, lowest, width of one from above
 MERGED = (1, 2, 4)  # cells along the side of a square
+UNSEEN = "#d5d8dc"
 MOST_HEARD = 0.5  # least share of each family's points in squares with enough of them
 
 
@@ -198,6 +199,7 @@ def _draw(axis: Axes, squares: pd.DataFrame, span: float) -> Any:
     mean[row, column] = squares["mean_mm"]
     edges = (*_ends(squares, "right", 0.0), *_ends(squares, "up", 0.0))
     limits = axis.get_xlim(), axis.get_ylim()
+    axis.set_facecolor(UNSEEN)  # white is a residual of zero
     image = axis.imshow(
         mean, origin="lower", extent=edges, cmap="RdBu_r", vmin=-span, vmax=span, interpolation="none", aspect="auto"
     )
