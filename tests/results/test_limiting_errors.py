@@ -32,7 +32,7 @@ def test_the_largest_is_named_for_each_value() -> None:
     roll, pitch, yaw, x, _, z = limiting_sentences(sources, rows(0.0261, 0.0043))
     assert roll == (
         "Roll is known to ±0.051 ° (95 %); most of that comes from the noise of the sensors and the INS: "
-        "more passes make it smaller"
+        "more passes make it smaller, on rough walls more walls"
     )
     assert pitch.endswith(
         "; most of that comes from how the wet faces may stand against the dry ones: survey them below the water"
