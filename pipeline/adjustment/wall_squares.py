@@ -12,23 +12,21 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from pipeline.adjustment.face_squares import SIDE_M, OutsideSquares, codes_of, faces_of, places_of
 from pipeline.adjustment.iteration import MountAdjustment, adjust_mount
 from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
 from pipeline.adjustment.point_sums import summed
 from pipeline.adjustment.problem import CalibrationProblem
-from pipeline.adjustment.residual_places import places_on_surface
 from pipeline.adjustment.weighted_iteration import IterationSettings
 from pipeline.artefacts.streams import Batch, Stream
 from pipeline.maths.adjustment.mixed_squares import PassExcess, mixed
 from pipeline.maths.adjustment.parameters import State, kind_of
 from pipeline.maths.geometry.passes import pass_of
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-SIDE_M = 0.25  # of a square
 BINS, OF_SIGMA = 128, 0.5  # of residuals, about zero; width in expected sigmas
 INSIDE = 0.5  # least edge weight of a sounding that is counted
-REACH, PASSES = 1 << 14, 1 << 10  # squares along a face: within ± this many, 4 km; passes that are told apart
+PASSES = 1 << 10  # that are told apart
 MERGED = 1_000_000  # codes of batches that wait, beyond twice those that are known
 
 
@@ -36,8 +34,8 @@ MERGED = 1_000_000  # codes of batches that wait, beyond twice those that are kn
 class Squares:
     """Mixed squares of a face as a head of the sonar sees it.
 
-    code (c,): as :func:`codes_of` gives it; points: soundings in them; share: of all on the face; low_m, high_m:
-    heights above the water between which they lie.
+    code (c,): as :func:`~pipeline.adjustment.face_squares.codes_of` gives it; points: soundings in them; share: of all
+    on the face; low_m, high_m: heights above the water between which they lie.
     """
 
     head: str
@@ -52,35 +50,6 @@ class Squares:
     def area_m2(self) -> float:
         """Return their area."""
         return len(self.code) * SIDE_M**2
-
-
-@dataclass(frozen=True)
-class OutsideSquares:
-    """Leaves those of a head's soundings that do not lie in squares (c,); they are placed by the mount of a state."""
-
-    model: ObservationModel
-    state: State
-    head: str
-    codes: Integers
-
-    def __call__(self, batch: Batch) -> Batch:
-        """Return the rows that are left."""
-        kept = np.ones(len(batch["face"]), dtype=bool)
-        rows = np.flatnonzero(np.isin(batch["face"], self.codes // (2 * REACH) ** 2))
-        some = {name: column[rows] for name, column in batch.items()}
-        kept[rows] = ~np.isin(codes_of(some, self.model, self.head, self.state), self.codes)
-        return {name: column[kept] for name, column in batch.items()}
-
-
-def codes_of(batch: Batch, model: ObservationModel, head: str, state: State) -> Integers:
-    """Return a number (n,) for the face of each sounding and the square of it that its ray meets."""
-    surface, face = model.faces.surface[batch["face"]], batch["face"].astype(np.int64)
-    tangents = np.array([each.tangents for each in state.surfaces])
-    centres = np.array([each.centre_m for each in state.surfaces])
-    from_centre_m = places_on_surface(model, head, batch, state) - centres[surface]
-    place = np.floor(np.einsum("nki,ni->nk", tangents[surface], from_centre_m) / SIDE_M)
-    column, row = np.clip(place, -REACH, REACH - 1).astype(np.int64).T + REACH
-    return np.asarray((face * 2 * REACH + column) * 2 * REACH + row)
 
 
 def adjust_clear_squares(
@@ -137,7 +106,7 @@ def mixed_squares(
     times_ns = passes["start_ns"].to_numpy(), passes["end_ns"].to_numpy()
     for head in (name for name in streams if kind_of(name) == "mbes"):
         code, number = _merged(streams[head].fold(_counted, model, head, adjustment.values, times_ns))
-        face_of = code // (PASSES * BINS * (2 * REACH) ** 2)
+        face_of = faces_of(code // (PASSES * BINS))
         for face in np.unique(face_of).tolist():
             first, last = np.searchsorted(face_of, [face, face + 1])
             if not state.surfaces[int(model.faces.surface[face])].level:
@@ -202,7 +171,7 @@ def _of_face(
         mine, count = run == each, np.zeros((len(squares), BINS), dtype=np.int64)
         count[row[mine], code[mine] % BINS] = number[mine]
         passes.append(PassExcess.of(count))
-    place = np.stack([squares // (2 * REACH) % (2 * REACH), squares % (2 * REACH)], axis=1) - REACH
+    place = places_of(squares)
     is_mixed = mixed(place, soundings, passes)
     if not is_mixed.any():
         return []

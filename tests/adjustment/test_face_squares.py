@@ -6,7 +6,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from pipeline.adjustment.wall_squares import SIDE_M, OutsideSquares, codes_of
+from pipeline.adjustment.face_squares import SIDE_M, OutsideSquares, codes_of
 from pipeline.maths.adjustment.observed_surface import ObservedSurface
 
 NORMAL = np.array([-1.0, 0.0, 0.0])  # of walls at x = 0, seen from x < 0
