@@ -118,6 +118,34 @@ def test_what_stands_before_a_wall_is_left_out_by_squares(errors_of: Any) -> Non
     assert mount_within_its_sigmas(result, errors_of(result["mbes"], session.truth), 4.0)
 
 
+def later(session: Any, by_m: Any) -> dict[str, Any]:
+    """The soundings' raw columns with ranges that are too long, by (n,) m."""
+    raw = dict(session.raw["mbes"])
+    return {"mbes": raw | {"two_way_time_s": raw["two_way_time_s"] + 2 * by_m / 1480.0}}
+
+
+def test_passes_that_contradict_each_other_are_told() -> None:
+    """Two of four passes measure 6 cm too far over their last two thirds: where passes overlap they differ."""
+    session = made(SLIP, {"ins": INS}, seed=3)
+    t_ns, ends_ns = session.raw["mbes"]["t_ns"], calibrated(session, "ingest", UNSURVEYED)["ingest/passes"]
+    by_m = np.zeros(len(t_ns))
+    for row in ends_ns.iloc[1::2].to_dict("records"):
+        by_m[(t_ns > (2 * row["start_ns"] + row["end_ns"]) // 3) & (t_ns <= row["end_ns"])] = 0.06
+    found = calibrated(session, pool=UNSURVEYED, raw=later(session, by_m))
+    assert found["adjust/left_out"].query("why == 'mixed'")["sigma"].max() < 0.2  # where both begin to be wrong
+    codes = set(json.loads(found["report/calibration.json"])["reason_codes"])
+    assert {"faces_in_doubt", "ins_drift_between_passes", "suspected_cause"} < codes
+
+
+def test_noise_of_outer_beams_is_told_and_not_taken_for_a_thing() -> None:
+    session = made(SLIP, {"ins": INS}, seed=3)
+    angle_deg, rng = np.degrees(session.raw["mbes"]["angle_rad"]), np.random.default_rng(3)
+    by_m = np.where(np.abs(angle_deg) > 40, rng.normal(0.0, 0.04, len(angle_deg)), 0.0)
+    found = calibrated(session, pool=UNSURVEYED, raw=later(session, by_m))
+    assert left_out(found) == set()
+    assert "many_outliers" in json.loads(found["report/calibration.json"])["warning_codes"]
+
+
 def test_growth_on_the_walls_widens_the_sigmas_until_they_are_true(errors_of: Any) -> None:
     growth = {"fouling_m": 0.03, "fouling_sigma_m": 0.02, "unevenness_length_m": 0.3, "back_wall": False}
     session, found, result = at(SLIP, {"surroundings": growth})

@@ -17,8 +17,8 @@ A square is mixed if its excess, of all passes together,
   squares of the face together have the chance 0.01 of one that is named wrongly, if soundings are independent;
 * is larger than 3 times the root of the number that are off, which is its standard deviation if each is off to either
   side by chance. But soundings of a ping are not independent: so
-* most of the passes that see the square, and two at least, must have an excess to this side. A thing stands there in
-  every pass; a bad ping, a fish, an echo of the boat does not.
+* most of the passes that see the square, and two at least, must have an excess to this side, beyond its own standard
+  deviation. A thing stands there in every pass; a bad ping, a fish, an echo of the boat does not.
 
 Amid a thing an echo comes from anywhere between it and the wall, and soundings are off to both sides. So a mixed square
 grows: those beside it that have a tenth more off than usual, to whatever side, belong to it, up to 3 squares away; and
@@ -87,7 +87,8 @@ def mixed(place: Integers, soundings: Integers, passes: Iterable[PassExcess]) ->
     of_passes = list(passes)
     number, off, excess = (np.array([getattr(one, name) for one in of_passes]) for name in ("number", "off", "excess"))
     seen, all_excess = number.sum(axis=0), excess.sum(axis=0)
-    agree = np.sum(excess * np.sign(all_excess) > LARGER_SHARE / 2 * number, axis=0, where=number > 0)
+    likely = np.maximum(LARGER_SHARE / 2 * number, np.sqrt(off))
+    agree = np.sum(excess * np.sign(all_excess) > likely, axis=0, where=number > 0)
     voted = (agree >= 2) & (2 * agree > np.sum(number > 0, axis=0))
     all_off = off.sum(axis=0)
     to_one_side = np.abs(all_excess) > CERTAIN * np.sqrt(all_off)
