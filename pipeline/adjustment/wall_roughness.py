@@ -8,6 +8,7 @@ import numpy as np
 
 from pipeline.adjustment.iterate import Iterate
 from pipeline.maths.adjustment.body_motion import BodyMotion
+from pipeline.maths.adjustment.parameters import kind_of
 from pipeline.maths.adjustment.ping_noise import DesignEffects, with_design_effects
 from pipeline.maths.adjustment.roughness import Roughness, roughness
 
@@ -36,7 +37,7 @@ def with_roughness(
     surfaces = linearisation.state.surfaces
     for sensor, sums in last.linearisation.sums.items():
         had = before.get(sensor, Roughness.none(len(surfaces)))
-        seen = roughness(sums, surfaces, body, last.drift, gap_s, had.shown)
+        seen = roughness(sums, surfaces, body, last.drift, gap_s, kind_of(sensor) == "mbes", had.shown)
         added = np.maximum(had.added, seen.added * (1 + had.added))
         found[sensor] = Roughness(added, np.maximum(had.patch_m, seen.patch_m), seen.shown)
         times = (1 + added) / (1 + had.added)

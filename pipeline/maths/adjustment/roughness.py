@@ -19,8 +19,8 @@ The mean over blocks and pairs of passes is the estimate of V. Each pass is firs
 give it and surfaces' parameters take up; of n blocks this takes 2 degrees of freedom, so V counts n / (n - 2) times.
 
 A line that covers a part of the height alone has the mean and the slope of the wall's shape there (a bow, the water's
-refraction): where a ledge hides the rest, all passes see this alike. So lines whose heights have less than half of the
-variance that is usual in their pass say nothing of V.
+refraction): where a ledge hides the rest, all passes see this alike. So pings' lines whose heights have less than half
+of the variance that is usual in their pass say nothing of V. (A scanner's intervals see parts of the height anyway.)
 
 A test says whether V is certain (:mod:`~pipeline.maths.adjustment.rough_blocks`). On a wall with too few blocks for it,
 what makes roughness likely holds for this wall.
@@ -112,6 +112,7 @@ def roughness(
     body: BodyMotion,
     drift: DriftEstimate,
     gap_s: float,
+    fans: bool,
     shown: bool = False,
 ) -> Roughness:
     """Return the roughness of the surfaces as one sensor sees it.
@@ -128,6 +129,8 @@ def roughness(
         The drift estimated so far.
     gap_s : float
         A longer time (s) without observations separates passes.
+    fans : bool
+        Whether an interval holds whole fans of beams, a ping's; those of a scanner hold parts of its turn.
     shown : bool
         Whether a test has found the place rough already, as with more of its walls.
     """
@@ -142,8 +145,9 @@ def roughness(
         along, total = _along(place[rows]), lines.total[rows].sum()
         per_length[number] = total / max(float(np.ptp(along)), SIZES_M[0])
         height_m[number] = max(float(np.sqrt(12 * lines.spread[rows].sum() / total)), SIZES_M[0])
-        whole = covering(lines.spread[rows] / lines.total[rows], run[rows])
-        rows, along = rows[whole], along[whole]
+        if fans:
+            whole = covering(lines.spread[rows] / lines.total[rows], run[rows])
+            rows, along = rows[whole], along[whole]
         means = PlacedLines(lines.mean[rows], lines.total[rows], along, run[rows]).by_size(len(walls))
         dof[number], slopes = means[0].dof, [OfBlocks()] * len(SIZES_M)
         sloping = lines.sloping[rows]
