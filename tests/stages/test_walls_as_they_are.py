@@ -124,6 +124,7 @@ def later(session: Any, by_m: Any) -> dict[str, Any]:
     return {"mbes": raw | {"two_way_time_s": raw["two_way_time_s"] + 2 * by_m / 1480.0}}
 
 
+@pytest.mark.thorough
 def test_passes_that_contradict_each_other_are_told() -> None:
     """Two of four passes measure 6 cm too far over their last two thirds: where passes overlap they differ."""
     session = made(SLIP, {"ins": INS}, seed=3)
