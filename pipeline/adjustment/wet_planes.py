@@ -63,12 +63,12 @@ class FaceLimits:
 
 @dataclass(frozen=True)
 class LeftOut:
-    """A surface, or a stripe of it, whose soundings are left out.
+    """A surface, or a stripe or squares of it, whose soundings are left out.
 
     family; why: "mixed", "few", "scatter", "step" or "off", or "doubt" if it is not left out; points: their number;
     sensor: that saw them; low_m, high_m: heights above the water, infinite at the ends of the face. unknown, value,
-    sigma: the wet face's parameter that is farthest off, rad or m; of a stripe value is what it stands off by, m, of
-    mixed squares their area, m², with their share of the soundings as sigma; otherwise "" and NaN.
+    sigma: the wet face's parameter that is farthest off, rad or m; of a stripe value is what it stands off by, m;
+    otherwise "" and NaN. area_m2, share: of mixed squares, and of the face's soundings in them; otherwise NaN.
     """
 
     family: str
@@ -80,6 +80,8 @@ class LeftOut:
     unknown: str = ""
     value: float = float("nan")
     sigma: float = float("nan")
+    area_m2: float = float("nan")
+    share: float = float("nan")
 
     @property
     def whole(self) -> bool:
@@ -144,7 +146,7 @@ def adjust_true_faces(
 
 def _of_squares(problem: CalibrationProblem, squares: Squares) -> LeftOut:
     family, place = _family(problem, squares.face), (squares.head, squares.low_m, squares.high_m)
-    return LeftOut(family, "mixed", squares.points, *place, value=squares.area_m2, sigma=squares.share)
+    return LeftOut(family, "mixed", squares.points, *place, area_m2=squares.area_m2, share=squares.share)
 
 
 def _of_stripe(problem: CalibrationProblem, stripe: Stripe) -> LeftOut:

@@ -56,7 +56,7 @@ def left_out_block(left_out: pd.DataFrame) -> dict[str, Any]:
     rows = [
         {"family": row["family"], "why": row["why"], "sensor": row["sensor"], "points": int(row["points"])}
         | {name: json_number(row[name]) for name in ("low_m", "high_m")}
-        | ({"area_m2": json_number(row["value"]), "share": json_number(row["sigma"])} if row["why"] == "mixed" else {})
+        | ({name: json_number(row[name]) for name in ("area_m2", "share")} if row["why"] == "mixed" else {})
         | {"words": _words(row)}
         for row in left_out[left_out["why"] != "doubt"].to_dict("records")
     ]
@@ -77,8 +77,8 @@ def _words(row: dict[Any, Any]) -> str:
         )
     if row["why"] == "mixed":
         return (
-            f"the {points} on {row['value']:.1f} m² of {family}, {_heights(row)}, are left out ({number}, "
-            f"{100 * row['sigma']:.0f} % of those on it): pass after pass many of a square lie to one side, as where a "
+            f"the {points} on {row['area_m2']:.1f} m² of {family}, {_heights(row)}, are left out ({number}, "
+            f"{100 * row['share']:.0f} % of those on it): pass after pass many of a square lie to one side, as where a "
             "ladder, a rope or a ledge stands before the wall; the map of the residuals shows where"
         )
     if row["why"] == "step":

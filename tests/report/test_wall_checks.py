@@ -30,8 +30,8 @@ STEP: dict[str, Any] = {"why": "step", "unknown": "", "value": 0.0571, "sigma": 
         (STEP | {"low_m": -2.0, "high_m": -1.5}, "on north from 1.5 to 2.0 m below the water are"),
         (STEP | {"sensor": "laser", "high_m": 0.35}, "the laser points on north up to 0.3 m above the water are"),
         (STEP, "the soundings on north at all heights are"),
-        (STEP | {"why": "mixed", "value": 1.625, "sigma": 0.124, "low_m": -2.0, "high_m": -1.5}, "the soundings on 1.6 "
-         "m² of north, from 1.5 to 2.0 m below the water, are left out (900, 12 % of those on it): pass after pass"),
+        (STEP | {"why": "mixed", "area_m2": 1.625, "share": 0.124, "low_m": -2.0, "high_m": -1.5}, "the soundings on "
+         "1.6 m² of north, from 1.5 to 2.0 m below the water, are left out (900, 12 % of those on it): pass after"),
         (STEP | {"low_m": -0.6, "high_m": 0.05}, "on north from 0.0 to 0.6 m below the water are"),
         (STEP | {"sensor": "laser", "low_m": 1.2}, "the laser points on north from 1.2 m above the water up are"),
     ],

@@ -133,7 +133,7 @@ def test_passes_that_contradict_each_other_are_told() -> None:
     for row in ends_ns.iloc[1::2].to_dict("records"):
         by_m[(t_ns > (2 * row["start_ns"] + row["end_ns"]) // 3) & (t_ns <= row["end_ns"])] = 0.06
     found = calibrated(session, pool=UNSURVEYED, raw=later(session, by_m))
-    assert found["adjust/left_out"].query("why == 'mixed'")["sigma"].max() < 0.2  # where both begin to be wrong
+    assert found["adjust/left_out"].query("why == 'mixed'")["share"].max() < 0.2  # where both begin to be wrong
     codes = set(json.loads(found["report/calibration.json"])["reason_codes"])
     assert {"faces_in_doubt", "ins_drift_between_passes", "suspected_cause"} < codes
 

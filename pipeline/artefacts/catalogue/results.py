@@ -131,9 +131,10 @@ LEFT_OUT = Artefact(
         Column("high_m", F64, "m", "height up to which they are (inf: to the highest)"),
         Column("unknown", TEXT, "", "its parameter that is farthest off"),
         Column("value", F64, "rad or m",
-               "by how much, if the other faces are as they are known to be; step: by how much they stand off; mixed: "
-               "area of the squares, m²"),
-        Column("sigma", F64, "rad or m", "standard deviation of it; mixed: their share of the face's soundings"),
+               "by how much, if the other faces are as they are known to be; step: by how much they stand off"),
+        Column("sigma", F64, "rad or m", "standard deviation of it"),
+        Column("area_m2", F64, "m²", "mixed: area of the squares (else NaN)"),
+        Column("share", F64, "1", "mixed: of the face's soundings, those in the squares (else NaN)"),
     ),
 )
 SURFACES = Artefact(
