@@ -32,7 +32,7 @@ def test_the_largest_is_named_for_each_value() -> None:
     roll, pitch, yaw, x, _, z = limiting_sentences(sources, rows(0.0261, 0.0043))
     assert roll == (
         "Roll is known to ±0.051 ° (95 %); most of that comes from the noise of the sensors and the INS: "
-        "more passes make it smaller, on rough walls more walls"
+        "more passes make it smaller"
     )
     assert pitch.endswith(
         "; most of that comes from how the wet faces may stand against the dry ones: survey them below the water"
@@ -40,6 +40,13 @@ def test_the_largest_is_named_for_each_value() -> None:
     assert "; the largest part of that comes from how the wet faces" in yaw  # 1.44 of 3.65
     assert x.startswith("Lever arm x is known to ±8.4 mm (95 %); most of that comes from the noise")
     assert "most of that comes from the noise" in z  # 1 of 1.81
+
+
+def test_on_rough_walls_more_passes_do_not_help() -> None:
+    sources = {NOISE: np.ones(6), "wet faces against dry ones": np.array([3.0, *np.zeros(5)])}
+    roll, pitch, *_ = limiting_sentences(sources, rows(0.0261, 0.0043), rough=True)
+    assert roll.endswith("every pass sees a rough wall's bumps again; more walls make it smaller")
+    assert pitch.endswith("survey them below the water")
 
 
 def test_without_sigmas_there_is_nothing_to_say() -> None:

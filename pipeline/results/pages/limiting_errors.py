@@ -12,7 +12,8 @@ from pipeline.mount import WITHIN_95
 from pipeline.report.sigma_sources import NOISE
 from pipeline.results.pages.mount_tables import Quantity
 
-NOISE_LIMITS = ("the noise of the sensors and the INS", "more passes make it smaller, on rough walls more walls")
+NOISE_LIMITS = ("the noise of the sensors and the INS", "more passes make it smaller")
+ROUGH_LIMITS = (NOISE_LIMITS[0], "every pass sees a rough wall's bumps again; more walls make it smaller")
 CAUSES = {  # by the beginning of the parameters' names (ERROR_SOURCES): the source in a sentence, and the remedy
     "laser_rotation": ("the angles of the laser's own mount", "calibrate the laser better (poolcal laser)"),
     "laser_lever_arm": ("the lever arm of the laser's own mount", "calibrate the laser better, or survey it again"),
@@ -40,7 +41,7 @@ MOST = 0.5  # share of the square of the total sigma from which on a source make
 
 
 def limiting_sentences(
-    sources: Mapping[str, NDArray[np.float64]], parameters: Sequence[Mapping[str, Any]]
+    sources: Mapping[str, NDArray[np.float64]], parameters: Sequence[Mapping[str, Any]], rough: bool = False
 ) -> Iterator[str]:
     """Yield a sentence for each mount parameter with a total sigma.
 
@@ -51,13 +52,15 @@ def limiting_sentences(
         (:func:`~pipeline.report.sigma_sources.contributions`).
     parameters
         Rows of :func:`~pipeline.results.pages.mount_tables.parameter_rows`.
+    rough
+        Whether walls are rough: their bumps are in the noise.
     """
     for row, (_, place, _, unit) in zip(parameters, PARAMETERS, strict=True):
         if not (sources and row["sigma_total"].known):
             continue
         squares = {words: float(of_source[place]) ** 2 for words, of_source in sources.items()}
         largest = max(squares, key=lambda words: squares[words])
-        source, remedy = IN_WORDS[largest]
+        source, remedy = ROUGH_LIMITS if rough and largest == NOISE else IN_WORDS[largest]
         half_width = Quantity(WITHIN_95 * row["sigma_total"].number, unit).small()
         name = MOUNT_WORDS[place]
         known = f"{name[0].upper()}{name[1:]} is known to ±{half_width} (95 %)"

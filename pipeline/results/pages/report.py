@@ -36,7 +36,7 @@ from pipeline.maths.mount_parameters import PARAMETERS
 from pipeline.maths.target.bottom_names import PIECES
 from pipeline.maths.target.family_words import families_in_words
 from pipeline.report.as_built import design_shape, reference_family
-from pipeline.report.reason_codes import verdict_of
+from pipeline.report.reason_codes import ReasonCode, verdict_of
 from pipeline.report.sigma_sources import contributions, laser_correlates
 from pipeline.results.pages.certificate import certificate_values, value_rows
 from pipeline.results.pages.currency import page_digest
@@ -135,7 +135,7 @@ def _result_values(
     return {
         "heads": heads,
         "certificate": certificate_values(tables, manifests, result, settings, rows),
-        "limiting": list(limiting_sentences(sources, rows)),
+        "limiting": list(limiting_sentences(sources, rows, ReasonCode.ROUGH_WALL in result["warning_codes"])),
         "held": [] if result["reasons"] else list(held),
         "verdict": verdict_of(result),
         "run": tables.run.absolute().name,
