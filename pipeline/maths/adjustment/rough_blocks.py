@@ -18,7 +18,7 @@ a wall that one pass alone has seen, roughness cannot be told from the pass's er
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,9 +58,14 @@ class PlacedLines:
     place_m: Array
     run: Integers
 
-    def by_size(self, walls: int = 1) -> list[OfBlocks]:
-        """Return what blocks of each size say; ``walls``: how many are tested at the place."""
-        return [self._of_blocks(size, LARGEST_CHANCE / walls) for size in SIZES_M]
+    def by_size(self, walls: int = 1, weight: float | None = None) -> list[OfBlocks]:
+        """Return what blocks of each size say.
+
+        walls: how many are tested at the place; weight: of all lines on the surface, where these are a part of them.
+        """
+        of_all = 1.0 if weight is None else weight / float(self.weight.sum())
+        by_size = [self._of_blocks(size, LARGEST_CHANCE / walls) for size in SIZES_M]
+        return [replace(one, added=of_all * one.added) for one in by_size]
 
     def _of_blocks(self, size_m: float, chance: float) -> OfBlocks:
         number = np.floor((self.place_m - self.place_m.min()) / size_m).astype(np.int64)

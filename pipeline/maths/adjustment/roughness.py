@@ -21,6 +21,7 @@ give it and surfaces' parameters take up; of n blocks this takes 2 degrees of fr
 A line that covers a part of the height alone has the mean and the slope of the wall's shape there (a bow, the water's
 refraction): where a ledge hides the rest, all passes see this alike. So pings' lines whose heights have less than half
 of the variance that is usual in their pass say nothing of V. (A scanner's intervals see parts of the height anyway.)
+They have their weight in the wall's mean all the same: ω is that of all lines, whichever of them V is taken from.
 
 A test says whether V is certain (:mod:`~pipeline.maths.adjustment.rough_blocks`). On a wall with too few blocks for it,
 what makes roughness likely holds for this wall.
@@ -145,22 +146,42 @@ def roughness(
         along, total = _along(place[rows]), lines.total[rows].sum()
         per_length[number] = total / max(float(np.ptp(along)), SIZES_M[0])
         height_m[number] = max(float(np.sqrt(12 * lines.spread[rows].sum() / total)), SIZES_M[0])
-        if fans:
-            whole = covering(lines.spread[rows] / lines.total[rows], run[rows])
-            rows, along = rows[whole], along[whole]
-        means = PlacedLines(lines.mean[rows], lines.total[rows], along, run[rows]).by_size(len(walls))
-        dof[number], slopes = means[0].dof, [OfBlocks()] * len(SIZES_M)
-        sloping = lines.sloping[rows]
-        rows, along = rows[sloping], along[sloping]
-        if len(rows):
-            sense = np.where(lines.along[rows] @ lines.along[rows[0]] < 0, -1.0, 1.0)
-            placed = PlacedLines(sense * lines.slope[rows], lines.spread[rows], along, run[rows])
-            slopes = placed.by_size(len(walls))
+        means, slopes = of_wall(lines, rows, along, run[rows], fans, len(walls))
+        dof[number] = means[0].dof
         for kind, by_size in enumerate((means, slopes)):
             added[kind, number] = [one.added for one in by_size]
             certain[kind, number] = [one.certain for one in by_size]
             tested[kind, number] = [one.tested for one in by_size]
     return Walls(added, certain, tested, per_length, height_m, dof).roughness(shown)
+
+
+def of_wall(
+    lines: Lines, rows: Integers, along_m: Array, run: Integers, fans: bool, walls: int
+) -> tuple[list[OfBlocks], list[OfBlocks]]:
+    """Return what blocks of each size say of a wall, by the means of its lines and by their slopes.
+
+    Parameters
+    ----------
+    lines : Lines
+        The lines of all walls.
+    rows : (n,) array
+        The wall's own among them, with their places along it (along_m, m) and the numbers of their passes (run).
+    fans : bool
+        Whether a line must cover the height (module docstring); what the others weigh counts all the same.
+    walls : int
+        How many walls are tested at the place.
+    """
+    total, spread = lines.total[rows], lines.spread[rows]
+    used = covering(spread / total, run) if fans else np.ones(len(rows), dtype=bool)
+    means = PlacedLines(lines.mean[rows][used], total[used], along_m[used], run[used])
+    of_means, of_slopes = means.by_size(walls, total.sum()), [OfBlocks()] * len(SIZES_M)
+    used &= lines.sloping[rows]
+    if used.any():
+        along, slope = lines.along[rows][used], lines.slope[rows][used]
+        sense = np.where(along @ along[0] < 0, -1.0, 1.0)
+        slopes = PlacedLines(sense * slope, spread[used], along_m[used], run[used])
+        of_slopes = slopes.by_size(walls, spread.sum())
+    return of_means, of_slopes
 
 
 @dataclass(frozen=True)

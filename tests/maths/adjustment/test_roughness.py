@@ -5,8 +5,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from pipeline.maths.adjustment.ping_differences import Lines
 from pipeline.maths.adjustment.rough_blocks import SIZES_M, PlacedLines
-from pipeline.maths.adjustment.roughness import OF_PLACE, Walls, covering
+from pipeline.maths.adjustment.roughness import OF_PLACE, Walls, covering, of_wall
 
 Array = np.ndarray
 LENGTH_M, PINGS, PASSES = 12.0, 300, 4
@@ -216,3 +217,30 @@ def test_lines_that_cover_a_part_of_the_height_are_told_pass_by_pass() -> None:
     runs = np.repeat([3, 7], 5)
     told = covering(heights_m**2 / 12, runs)
     assert told.tolist() == [True, True, False, True, True, True, True, True, False, True]
+
+
+@pytest.mark.parametrize("fans", [True, False])
+def test_lines_of_a_part_of_the_height_have_their_weight_all_the_same(fans: bool) -> None:
+    """Half of the lines see half of the height, where the wall has another shape: noise of a decimetre in their means.
+
+    Their weight is half of that of whole lines. So the effect is 1.5 times that of the whole lines alone.
+    """
+    rng = np.random.default_rng(5)
+    whole = lines(rng, field(rng, 0.3))
+    n, part = len(whole.value), 0.1 * rng.normal(size=len(whole.value))
+    of_part = np.repeat([False, True], n)
+    total, height_m = np.where(of_part, 0.5, 1.0) * whole.weight[0], np.where(of_part, 1.0, 2.0)
+    both = Lines(
+        record=np.arange(2 * n), surface=np.zeros(2 * n, dtype=int), total=total, spread=total * height_m**2 / 12,
+        mean=np.concatenate([whole.value, part]), slope=np.concatenate([whole.value, part]),
+        along=np.tile([0.0, 1.0], (2 * n, 1)), of_mean=total, of_slope=total, sloping=np.ones(2 * n, dtype=bool),
+    )  # fmt: skip
+    place, run = np.tile(whole.place_m, 2), np.tile(whole.run, 2)
+    means, slopes = of_wall(both, np.arange(2 * n), place, run, fans, walls=1)
+    alone = whole.by_size()
+    if fans:
+        assert [one.added for one in means] == pytest.approx([1.5 * one.added for one in alone])
+        assert [one.added for one in slopes] == pytest.approx([1.125 / 3 * one.added for one in alone])
+        assert [one.tested for one in means] == [one.tested for one in alone]
+    else:
+        assert means[0].added != pytest.approx(1.5 * alone[0].added, rel=0.05)
