@@ -1,8 +1,9 @@
 """Drift of the INS, eliminated knot by knot; the normal equations of the parameters alone remain.
 
 With the records' white noise eliminated, the normal matrix has arrow form: the knots are a band, the parameters x its
-border. Banded Cholesky (LAPACK pbtrf) eliminates the knots. The Schur complement of x is the inverse covariance of x
-with all pose errors unknown; the knots follow from x. Prior: :mod:`pipeline.maths.adjustment.pose_errors`.
+border. Block Cholesky eliminates the knots, one after the other (:mod:`~pipeline.maths.kernels.knot_chain`). The Schur
+complement of x is the inverse covariance of x with all pose errors unknown; the knots follow from x. Prior:
+:mod:`pipeline.maths.adjustment.pose_errors`.
 """
 
 from dataclasses import dataclass
@@ -12,6 +13,8 @@ from numpy.typing import NDArray
 
 from pipeline.maths.adjustment.eliminate_white_noise import ReducedIntervals
 from pipeline.maths.adjustment.pose_errors import N_POSE, DriftEstimate, PoseNoise
+from pipeline.maths.kernels.compiled import block
+from pipeline.maths.kernels.knot_chain import add_spans, eliminate_knots
 
 Array = NDArray[np.float64]
 
@@ -52,59 +55,38 @@ def eliminate_drift(reduced: ReducedIntervals, noise: PoseNoise, drift: DriftEst
     drift : DriftEstimate
         The drift at which the observations were linearised.
     """
-    from scipy.linalg import cho_solve_banded, cholesky_banded
-
     knots, current = drift.knots, drift.values
     u, count = len(reduced.others) - 1, len(knots.record)
     scale = noise.drift
-    first, second = slice(0, N_POSE), slice(N_POSE, 2 * N_POSE)  # rows of a span's knots
-    before, after = slice(u, u + N_POSE), slice(u + N_POSE, u + 2 * N_POSE)  # their columns
-    sides = [*range(u), u + 2 * N_POSE]  # x and v
-    # blocks of the normal matrix: each knot with itself (diagonal), with the next (coupling), with x and v (border)
-    diagonal, coupling = np.zeros((count, N_POSE, N_POSE)), reduced.spans[:, first, after] * scale[:, None] * scale
+    # blocks of the normal matrix: each knot with itself (own), with the next (ahead), with x and v (border)
+    own, ahead = np.zeros((count, N_POSE, N_POSE)), np.zeros((count - 1, N_POSE, N_POSE))
     border = np.zeros((count, N_POSE, u + 1))
-    for place, rows, of in ((slice(0, -1), first, before), (slice(1, None), second, after)):
-        diagonal[place] += reduced.spans[:, rows, of]
-        border[place] += reduced.spans[:, rows][:, :, sides]
-    diagonal, border = diagonal * scale[:, None] * scale, border * scale[:, None]
+    add_spans(block(reduced.spans), scale, own, ahead, border)
     phi = np.exp(-np.diff(knots.seconds) / noise.time_constant_s)
     variance = -np.expm1(-2 * np.diff(knots.seconds) / noise.time_constant_s)  # 1 - φ², exact for a long τ too
     unit = np.eye(N_POSE)
-    diagonal[0] += unit
-    diagonal[:-1] += (phi**2 / variance)[:, None, None] * unit
-    diagonal[1:] += (1 / variance)[:, None, None] * unit
-    coupling -= (phi / variance)[:, None, None] * unit
+    own[0] += unit
+    own[:-1] += (phi**2 / variance)[:, None, None] * unit
+    own[1:] += (1 / variance)[:, None, None] * unit
+    ahead -= (phi / variance)[:, None, None] * unit
     xi = np.divide(current, scale, out=np.zeros_like(current), where=scale > 0)  # the drift in units of σ
     innovation = xi[1:] - phi[:, None] * xi[:-1]  # part of the drift that does not follow from the knot before
     weighted = innovation / variance[:, None]  # innovation times its weight
     border[0, :, u] += xi[0]
     border[1:, :, u] += weighted
     border[:-1, :, u] -= phi[:, None] * weighted
-    factor = cholesky_banded(_banded(diagonal, coupling), lower=True)
-    flat = border.reshape(-1, u + 1)
-    solved = cho_solve_banded((factor, True), flat)
-    total = reduced.others.copy()
+    total, log_determinant = np.array(reduced.others, order="C"), np.empty(1)
     total[u, u] += float(np.sum(xi[0] ** 2) + np.sum(innovation * weighted))
-    total -= flat.T @ solved
-    log_determinant = 2 * float(np.sum(np.log(factor[0]))) + N_POSE * float(np.sum(np.log(variance)))
-    back = solved.reshape(count, N_POSE, u + 1) * scale[:, None]
+    eliminate_knots(own, ahead, border, total, log_determinant)
+    if not np.isfinite(log_determinant[0]):
+        raise np.linalg.LinAlgError("the normal matrix of the drift's knots is not positive definite")
+    of_prior = N_POSE * float(np.sum(np.log(variance)))
+    back = border * scale[:, None]
     return NormalEquations(
         normal=total[:u, :u],
         right=total[:u, u],
         squares=float(total[u, u]),
-        log_determinant=reduced.log_determinant + log_determinant,
+        log_determinant=reduced.log_determinant + float(log_determinant[0]) + of_prior,
         knots_by_parameter=back[:, :, :u],
         knots_at_zero=-back[:, :, u],
     )
-
-
-def _banded(diagonal: Array, coupling: Array) -> Array:
-    """Return the lower band (12, 6k) of the symmetric matrix with these blocks on and next to its diagonal."""
-    count = len(diagonal)
-    band = np.zeros((2 * N_POSE, N_POSE * count))
-    for row in range(N_POSE):
-        for column in range(N_POSE):
-            if row >= column:
-                band[row - column, column::N_POSE] = diagonal[:, row, column]
-            band[N_POSE + row - column, column : N_POSE * (count - 1) : N_POSE] = coupling[:, column, row]
-    return band

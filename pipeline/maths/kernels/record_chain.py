@@ -9,11 +9,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.maths.kernels.block_cholesky import (
+    N_POSE,
+    factorised,
+    is_zero,
+    less_product,
+    less_square,
+    substituted,
+)
 from pipeline.maths.kernels.compiled import CUBE, CUBES, LINE, MATRIX, NUMBERS, compiled, named
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-N_POSE, N_MOVED = 6, 3  # numbers of a pose error, and of the features on which it acts
+N_MOVED = 3  # features on which a pose error acts
 LINEAR = (NUMBERS, CUBE, MATRIX, MATRIX, CUBE, MATRIX)  # sides, design, pose, by_knot, normal, right
 
 
@@ -179,64 +187,6 @@ def add_records(
                 border[j, k + 1, p, sides[column]] += later_x[p, column]
 
 
-@compiled()
-def _factorised(block: Array) -> float:
-    """Put the Cholesky factor L of A = L Lᵀ (6, 6) into the lower triangle; return log det A."""
-    logarithm = 0.0
-    for p in range(N_POSE):
-        for q in range(p + 1):
-            total = block[p, q]
-            for k in range(q):
-                total -= block[p, k] * block[q, k]
-            if p == q:
-                block[p, p] = np.sqrt(total)
-                logarithm += 2 * np.log(block[p, p])
-            else:
-                block[p, q] = total / block[q, q]
-    return logarithm
-
-
-@compiled()
-def _substituted(factor: Array, lines: Array) -> None:
-    """Put L⁻¹ B in the place of B (6, n)."""
-    for p in range(N_POSE):
-        for k in range(p):
-            for column in range(lines.shape[1]):
-                lines[p, column] -= factor[p, k] * lines[k, column]
-        for column in range(lines.shape[1]):
-            lines[p, column] /= factor[p, p]
-
-
-@compiled()
-def _less_product(left: Array, right: Array, lines: Array) -> None:
-    """Take leftᵀ right away from ``lines`` (6, n)."""
-    for k in range(N_POSE):
-        for p in range(N_POSE):
-            for column in range(lines.shape[1]):
-                lines[p, column] -= left[k, p] * right[k, column]
-
-
-@compiled()
-def _less_square(lines: Array, sums: Array) -> None:
-    """Take linesᵀ lines of ``lines`` (6, y) away from ``sums`` (y, y)."""
-    for p in range(len(sums)):
-        of_row = sums[p]
-        a, b, c, d, e, f = lines[0, p], lines[1, p], lines[2, p], lines[3, p], lines[4, p], lines[5, p]
-        for q in range(len(sums)):
-            swept = a * lines[0, q] + b * lines[1, q] + c * lines[2, q] + d * lines[3, q]
-            of_row[q] -= swept + e * lines[4, q] + f * lines[5, q]
-
-
-@compiled()
-def _is_zero(block: Array) -> bool:
-    """Return whether all elements of a matrix are zero."""
-    for row in range(block.shape[0]):
-        for column in range(block.shape[1]):
-            if block[row, column] != 0.0:
-                return False
-    return True
-
-
 @compiled((CUBES, CUBES, CUBES, LINE, CUBE, LINE))
 def eliminate_records(
     own: Array, ahead: Array, border: Array, white: Array, sums: Array, log_determinant: Array
@@ -262,7 +212,7 @@ def eliminate_records(
         linked = False
         for k in range(length):
             block, lines, following = own[j, k], border[j, k], ahead[j, k]
-            if not linked and _is_zero(block):
+            if not linked and is_zero(block):
                 continue
             for p in range(N_POSE):
                 for q in range(N_POSE):
@@ -272,11 +222,11 @@ def eliminate_records(
                 for column in range(lines.shape[1]):
                     lines[p, column] *= white[p]
             if linked:  # what the record before leaves
-                _less_product(ahead[j, k - 1], ahead[j, k - 1], block)
-                _less_product(ahead[j, k - 1], border[j, k - 1], lines)
-            log_determinant[j] += _factorised(block)
-            _substituted(block, lines)
-            _less_square(lines, sums[j])
-            linked = not _is_zero(following)
+                less_product(ahead[j, k - 1], ahead[j, k - 1], block)
+                less_product(ahead[j, k - 1], border[j, k - 1], lines)
+            log_determinant[j] += factorised(block)
+            substituted(block, lines)
+            less_square(lines, sums[j])
+            linked = not is_zero(following)
             if linked:
-                _substituted(block, following)
+                substituted(block, following)
