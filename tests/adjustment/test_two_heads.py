@@ -29,7 +29,7 @@ def test_without_noise_the_truth_of_both_heads_comes_back() -> None:
 
 def test_errors_of_both_heads_are_as_large_as_their_common_covariance_says() -> None:
     """Mean normalised squared error of the twelve, and of the heads' difference, where the cross-covariance counts."""
-    repeats = often(16, 40)
+    repeats = often(8, 40)
     of_both, of_difference = [], []
     difference = np.hstack([np.eye(6), -np.eye(6)])
     for seed in range(300, 300 + repeats):

@@ -60,6 +60,7 @@ def test_a_failure_to_draw_spoils_nothing(done: Place, right: dict[str, str], mo
         assert digests(done.run) == right
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("jobs", often([4], [2, 4]))
 def test_processes_of_their_own_draw_the_same(done: Place, right: dict[str, str], drawn: Path, jobs: int) -> None:
     """Whether one draws all, or one the page and one the recordings."""

@@ -1,5 +1,6 @@
 """The patent's target by its faces, through files and the command line: the same bytes."""
 
+import pytest
 import yaml
 
 from stages import ORDER
@@ -8,6 +9,7 @@ from tests.support.places import Place, digests, poolcal
 from tests.support.targets import as_faces
 
 
+@pytest.mark.thorough
 def test_faces_give_the_same_bytes_as_the_letters(place: Place, right: dict[str, str]) -> None:
     content = yaml.safe_load(place.config.read_text(encoding="utf-8"))
     content["target"] = as_faces(content["target"])

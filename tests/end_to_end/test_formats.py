@@ -36,7 +36,7 @@ EQUIDISTANT: dict[str, dict[str, Any]] = {  # other beams than equi-angle ones, 
 }
 
 
-@pytest.mark.parametrize("what", often(list(FILES)[::2], list(FILES)))
+@pytest.mark.parametrize("what", often(list(FILES)[::3], list(FILES)))
 def test_files(what: str, tmp_path: Path, undisturbed: tuple[Path, Any]) -> None:
     """Rounding differs (ASCII to 1e-9 deg, ECEF to 0.1 mm): a hundredth of a sigma.
 

@@ -93,6 +93,7 @@ def test_a_second_run_has_nothing_to_do_and_verify_looks_at_both(session: Path, 
         victim.write_bytes(spoilt)
 
 
+@pytest.mark.thorough
 def test_another_coarse_mount_of_the_second_head_runs_its_stages_and_the_adjustment_again(
     session: Path, run: Path, tmp_path: Path
 ) -> None:

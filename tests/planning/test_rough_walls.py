@@ -43,12 +43,14 @@ def overgrown() -> tuple[Any, dict[str, Any]]:
     return session, json.loads(found["report/calibration.json"])["methods"]["adjustment"]
 
 
-def planned(session: Any, kind: str = "sigma_mount", **rough: float) -> dict[str, float]:
+def planned(
+    session: Any, kind: str = "sigma_mount", distances: tuple[float, ...] = DISTANCES, **rough: float
+) -> dict[str, float]:
     pool = session.pool | {"as_built": UNSURVEYED | {"growth_sigma_m": 0.03} | rough}
     content = {
         "laser": {"point_rate_hz": THIN["laser"]["point_rate_hz"]},
         "mbes": {"ping_rate_hz": THIN["mbes"]["ping_rate_hz"]},
-        "passes": [{"distance_m": distance} for distance in DISTANCES],
+        "passes": [{"distance_m": distance} for distance in distances],
     }
     configs = parse(PoolConfig, pool, "pool"), parse(SessionConfig, session.session, "session")
     return plan_document(assess_plan(parse(Plan, content, "plan"), *configs))["given"][kind]
@@ -66,11 +68,12 @@ def test_a_plan_that_knows_of_it_predicts_the_sigmas(overgrown: tuple[Any, dict[
 
 def test_rough_dry_faces_count_as_rough_wet_ones_do() -> None:
     """The laser sees a wall of stones as rough as the sonar does: each makes the total sigmas larger, both more."""
-    session = made(copy.deepcopy(DOCK), {"track": {"distances_m": list(DISTANCES)}}, seed=6)
+    distances = DISTANCES[:2]
+    session = made(copy.deepcopy(DOCK), {"track": {"distances_m": list(distances)}}, seed=6)
     rough = {"roughness_m": 0.004, "dry_roughness_m": 0.004}
     smooth, wet, dry, both = (
-        np.array(list(planned(session, "sigma_mount_total", **{name: rough[name] for name in names}).values()))
-        for names in ((), ("roughness_m",), ("dry_roughness_m",), tuple(rough))
+        np.array(list(planned(session, "sigma_mount_total", distances, **one).values()))
+        for one in ({}, {"roughness_m": 0.004}, {"dry_roughness_m": 0.004}, rough)
     )
     assert np.all(wet > smooth)
     assert np.all(dry > smooth)

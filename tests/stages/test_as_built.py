@@ -61,6 +61,7 @@ def test_a_wet_wall_pushed_back_by_the_water_is_found_and_allowed_for(bowed, err
     assert abs(errors_of(mbes, session.truth)[3]) < 3 * 1e3 * mbes["sigma_mount_total"]["x_m"]
 
 
+@pytest.mark.thorough
 def test_wet_faces_that_are_all_bowed_are_named_together():
     """By 9 mm, nine sigmas of each bow: P1, P2 and P3 explain a part each, and all of it together."""
     fault = {"face_faults": [{"faces": ["P1", "P2", "P3"], "part": "wet", "bow_m": -0.009}]}

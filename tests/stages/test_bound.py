@@ -25,6 +25,7 @@ KINDS = [
 ]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("scenario", "segment"), often(KINDS[2:3], KINDS))
 def test_the_random_sigmas_are_those_of_the_best_estimator(scenario, segment):
     scenario = merged(scenario, {"ins": {"rate_hz": 200.0}})

@@ -3,6 +3,8 @@
 import json
 from typing import Any
 
+import pytest
+
 from tests.support.docks import BOTH_SIDES, DOCK, LOCK
 from tests.support.simulated import calibrated, made, mount_within_its_sigmas
 
@@ -21,6 +23,7 @@ def lever_arm_x(place: str, growth_sigma_m: float, layer_m: float, errors_of: An
     return errors[3] / 1e3, result["mbes"]["sigma_mount_total"]["x_m"], mount_within_its_sigmas(result, errors, 4.0)
 
 
+@pytest.mark.thorough
 def test_on_walls_to_one_side_it_looks_like_a_lever_arm(errors_of: Any) -> None:
     """What the boat's turning tells of x on walls in several directions tells the two apart, if it is looked for."""
     taken_m, silent_m, within = lever_arm_x("walls to one side", 0.0, LAYER_M, errors_of)

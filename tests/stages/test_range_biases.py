@@ -65,6 +65,7 @@ def test_a_transmitter_whose_place_no_document_tells_is_found_and_allowed_for(er
     assert ("higher" if sign > 0 else "lower") in result["warnings"][place]
 
 
+@pytest.mark.thorough
 def test_a_bias_of_the_lasers_ranges_is_found_on_tops_and_bottoms(errors_of: Any) -> None:
     """One and a half of its sigma. From the laser's height both the lower blocks' tops and the upper ones' bottoms are
     seen, under whose normals, which point up, the same bias moves points to opposite sides."""

@@ -51,6 +51,7 @@ def found_two(noisy_two: SimulatedSession) -> dict[str, Any]:
     return calibrated(noisy_two)
 
 
+@pytest.mark.thorough
 def test_without_noise_both_heads_come_back() -> None:
     session = without_biases(made_with_heads(QUIET, mounts=BOTH))
     result = result_of(calibrated(session))

@@ -91,6 +91,7 @@ def test_a_certificate_is_two_sheets(place: Place, program: str) -> None:
     assert sheets_of(printed(place, program, "--certificate")) == alone
 
 
+@pytest.mark.thorough
 def test_a_rejected_run_is_marked_on_every_sheet(place: Place, program: str) -> None:
     place.edit_config("verdict", max_sigma_deg=1e-6)
     assert place.calibrate("--no-report").status == 1

@@ -13,7 +13,6 @@ from tests.support.viewer import views_of
 from tools.pictures import show_tab, viewer
 
 REJECTED, LASER = "rejected", "laser"  # beside the scenarios
-IN_THE_USUAL_SUITE = (REJECTED,)
 EVERY = [*sorted(path.stem for path in SCENARIOS.glob("*.yaml")), REJECTED, LASER]
 GONE = {  # tabs, where there is nothing to show
     "caisson": {"Iteration"}, "dock": {"Iteration"}, REJECTED: {"Iteration"}, LASER: {"Before and after", "Iteration"},
@@ -35,9 +34,8 @@ def calibrated(name: str, folder: Path) -> Path:
     return folder / "run"
 
 
-@pytest.mark.parametrize(
-    "name", [name if name in IN_THE_USUAL_SUITE else pytest.param(name, marks=pytest.mark.thorough) for name in EVERY]
-)
+@pytest.mark.thorough
+@pytest.mark.parametrize("name", EVERY)
 def test_the_viewer_opens_it(name: str, tmp_path: Path) -> None:
     run = calibrated(name, tmp_path)
     tabs = tabs_of(run)

@@ -45,6 +45,7 @@ def test_every_view_of_every_tab_shows_something(client: Any, tab: str, tmp_path
             assert max(count for count, _ in colours) < 0.995 * image.width * image.height, view.name
 
 
+@pytest.mark.thorough
 def test_a_scrub_through_the_iteration_closes_the_planes(client: Any, tmp_path: Path) -> None:
     """The sonar's planes and points move from step to step, and come to rest."""
     show_tab(client, "Iteration")
