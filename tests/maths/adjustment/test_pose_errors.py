@@ -113,6 +113,17 @@ def dense(rows: list[Any], knots: Knots, seconds: np.ndarray, noise: PoseNoise, 
     return np.concatenate(design), np.concatenate(value), white0
 
 
+def test_sums_that_no_observations_can_have_give_no_result() -> None:
+    """A negative square of a knot, or no number: the factorisation must not go on with it unseen."""
+    knots = Knots(np.arange(3), np.arange(3.0), np.ones(2, dtype=bool))
+    noise, drift = PoseNoise(np.zeros(SIX), np.full(SIX, 0.3), 4.0), DriftEstimate(knots, np.zeros((3, SIX)))
+    for wrong in (-1e6, np.nan):
+        spans = np.zeros((2, 2 * SIX, UNKNOWNS + 2 * SIX + 1))
+        spans[1, 3, UNKNOWNS + 3] = wrong
+        with pytest.raises(np.linalg.LinAlgError, match="not positive definite"):
+            eliminate_drift(ReducedIntervals(spans, np.eye(UNKNOWNS + 1), 0.0), noise, drift)
+
+
 @pytest.mark.parametrize("white", [0.0, 0.7])
 def test_elimination_is_the_dense_solution(white: float) -> None:
     rng = np.random.default_rng(3)
