@@ -39,6 +39,8 @@ def _answer(difference: Mapping[str, Any]) -> str:
         return f"the raw files are the same, so settings or software have moved the result, {_listed(each)}{rest}"
     within = f"all six differences are within their errors ({chance})"
     if difference["answer"] == "no_movement_shown":
+        if not difference["inputs"]:
+            within += "; but both runs are of the same raw files, with the same noise: the difference is known better"
         return f"no movement shown: {within}"
     rows = [row for row in difference["parameters"] if row["uncertain"]]
     unseen = [f"{least_text(row['detectable'], row['unit'])} in {row['parameter']}" for row in rows]

@@ -59,6 +59,7 @@ def test_other_settings_are_named(undisturbed: tuple[Path, Told], wider: Place) 
     assert found["planes"]
     assert found["answer"] == "no_movement_shown"  # of the same raw files, whatever could be seen
     assert found["sentence"].startswith("no movement shown: all six differences are within their errors")
+    assert "both runs are of the same raw files, with the same noise" in found["sentence"]
     assert found["visible"] == ""
     largest = max(abs(row["difference"]) for row in found["parameters"] if row["unit"] == "deg")
     for factor, expected in ((0.99, 1), (1.01, 0)):
@@ -103,6 +104,7 @@ def test_what_it_cannot_see_it_says(undisturbed: tuple[Path, Told], tmp_path: Pa
         assert source in found["sentence"].partition("most of the uncertainty")[2]
     status, found = compared(undisturbed[0], run, "--tolerance-deg", 0.5, "--tolerance-mm", 80)
     assert (status, found["answer"]) == (0, "no_movement_shown")
+    assert "same raw files" not in found["sentence"]
 
 
 def test_another_mount_of_the_laser_and_another_target_share_nothing(
