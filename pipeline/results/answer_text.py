@@ -40,7 +40,10 @@ def _answer(difference: Mapping[str, Any]) -> str:
     within = f"all six differences are within their errors ({chance})"
     if difference["answer"] == "no_movement_shown":
         if not difference["inputs"]:
-            within += "; but both runs are of the same raw files, with the same noise: the difference is known better"
+            within += (
+                "; but both runs are of the same raw files, with the same noise, so the errors of the difference are "
+                "smaller than counted here"
+            )
         return f"no movement shown: {within}"
     rows = [row for row in difference["parameters"] if row["uncertain"]]
     unseen = [f"{least_text(row['detectable'], row['unit'])} in {row['parameter']}" for row in rows]
