@@ -6,6 +6,7 @@ cos τ sin ψ. The receive beam at the angle θ hears the ray with the component
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -151,39 +152,54 @@ class BeamBundles:
         lean = (np.tan(tilt_rad) / np.cos(swing))[..., None]
         across, along = self.across_rad, self.along_rad
         if self.aperture_m.any():
-            wider = self._wider(origins_m, R_target_from_mbes, directions_in_mbes(swing, tilt_rad))
+            axis_ranges_m = self.axis_ranges(origins_m, R_target_from_mbes, swing, tilt_rad)
+            wider = self.widths_rad(axis_ranges_m) / self.beam_rad
             across, along = across * wider[..., :1], along * wider[..., 1:]
         turned = np.hypot(1.0, lean) * across + lean * np.sin(swing)[..., None] * along
         direction_mbes = directions_in_mbes(swing[..., None] + turned, tilt_rad[..., None] + along)
         directions = direction_mbes.reshape(pings, beams * self.rays, 3) @ R_target_from_mbes.transpose(0, 2, 1)
         origins = np.repeat(origins_m, beams * self.rays, axis=0)
         flat = directions.reshape(-1, 3)
-        ranges, surfaces = self.caster.cast(origins, flat)
-        wet = (surfaces >= 0) & (ranges <= self.max_range_m)
-        wet &= origins[:, 2] + np.where(wet, ranges, 0.0) * flat[:, 2] < self.water_level_m
-        paths = np.where(wet, ranges, 0.0)
-        if self.projector_m.any():
-            points_mbes = paths[:, None] * direction_mbes.reshape(-1, 3)
-            paths = (paths + np.linalg.norm(points_mbes - self.projector_m, axis=1)) / 2
+        reach, triangles = self.caster.first_met(origins, flat)
+        wet, paths = self._wet(reach, origins, flat), np.zeros(len(reach))
         shape = (pings, beams, self.rays)
-        detected = self._detect(paths.reshape(shape), wet.reshape(shape), surfaces.reshape(shape))
+        rays_wet, surfaces = wet.reshape(shape), self.caster.mesh.surfaces[triangles].reshape(shape)
+        one_plane = np.all(rays_wet & (surfaces == surfaces[..., self.axis, None]), axis=-1)
+        needed = rays_wet & (~one_plane[..., None] | (np.arange(self.rays) == self.axis))
+        rows = np.flatnonzero(needed)
+        paths[rows] = self.caster.ranges(triangles[rows], origins[rows], flat[rows])
+        wet[rows] = self._wet(paths[rows], origins[rows], flat[rows])
+        if self.projector_m.any():
+            points_mbes = paths[rows, None] * direction_mbes.reshape(-1, 3)[rows]
+            paths[rows] = (paths[rows] + np.linalg.norm(points_mbes - self.projector_m, axis=1)) / 2
+        detected = self._detect(paths.reshape(shape), wet.reshape(shape), one_plane)
         return detected, directions.reshape(*shape, 3)[:, :, self.axis]
 
     def widths_rad(self, ranges_m: Floats) -> Floats:
         """Return the widths (..., 2) of beams, across and along, at ranges (...)."""
         return np.maximum(self.beam_rad, self.aperture_m / np.maximum(ranges_m, 0.1)[..., None])
 
-    def _wider(self, origins_m: Floats, R_target_from_mbes: Floats, axes_mbes: Floats) -> Floats:
-        """Return by how much beams (p, b) are wider than in the far field, across and along, (p, b, 2)."""
-        axes = axes_mbes @ R_target_from_mbes.transpose(0, 2, 1)
+    def axis_ranges(
+        self, origins_m: Floats, R_target_from_mbes: Floats, swing: Floats, tilt_rad: Floats
+    ) -> Floats:
+        """Return the ranges (p, b) m to what the beams' axes meet; inf: nothing. Parameters as for :meth:`paths`."""
+        axes = directions_in_mbes(swing, tilt_rad) @ R_target_from_mbes.transpose(0, 2, 1)
         ranges, _ = self.caster.cast(np.repeat(origins_m, axes.shape[1], axis=0), axes.reshape(-1, 3))
-        return self.widths_rad(ranges.reshape(axes.shape[:2])) / self.beam_rad
+        return ranges.reshape(swing.shape)
 
-    def _detect(self, paths: Floats, wet: NDArray[np.bool_], surfaces: NDArray[np.int64]) -> Floats:
-        """Return the detected path (p, b) of each beam from the paths of its rays (p, b, rays); inf: no detection."""
-        axis = slice(self.axis, self.axis + 1)
-        one_plane = np.all(wet & (surfaces == surfaces[..., axis]), axis=-1)
+    def _wet(
+        self, ranges_m: NDArray[np.floating[Any]], origins_m: Floats, directions: Floats
+    ) -> NDArray[np.bool_]:
+        """Return which rays (n,) meet something below the water, within the sonar's range."""
+        near = ranges_m <= self.max_range_m
+        z_m = origins_m[:, 2] + np.where(near, ranges_m, 0.0) * directions[:, 2]
+        return np.asarray(near & (z_m < self.water_level_m))
+
+    def _detect(self, paths: Floats, wet: NDArray[np.bool_], one_plane: NDArray[np.bool_]) -> Floats:
+        """Return the detected path (p, b) of each beam from those of its rays (p, b, rays); inf: no detection."""
+        paths = np.where(wet, paths, 0.0)
         weights = self.weights * wet
         total = weights.sum(axis=-1)
         mean = np.divide((weights * paths).sum(axis=-1), total, out=np.full(total.shape, np.inf), where=total > 0)
-        return np.where(one_plane, paths[..., self.axis], np.where(total >= LEAST_WEIGHT, mean, np.inf))
+        on_axis = np.where(wet[..., self.axis], paths[..., self.axis], np.inf)
+        return np.where(one_plane, on_axis, np.where(total >= LEAST_WEIGHT, mean, np.inf))

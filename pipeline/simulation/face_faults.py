@@ -9,7 +9,6 @@ from pipeline.simulation.mesh import BOX, POOL_NAMES, Mesh
 from pipeline.simulation.scenario_surroundings import FaceFault
 from pipeline.simulation.site import Floats
 
-Bools = NDArray[np.bool_]
 _LEVEL = 0.99  # vertical component of the normal of a level face
 _SIDES = {"south": "P1", "north": "P3"}
 
@@ -45,6 +44,7 @@ class PlacedFault:
         self, fault: FaceFault, number: int, faces: NDArray[np.str_], mesh: Mesh, water_level_m: float
     ) -> None:
         self.fault, self.mesh, self.water_level_m = fault, mesh, water_level_m
+        self.parts = (fault.part != "wet", fault.part != "dry")  # whether it is on the dry part, and on the wet one
         known = {name for face in set(faces) - {""} for name in _families(str(face))}
         for name in fault.faces:
             if name not in known:
@@ -52,7 +52,8 @@ class PlacedFault:
                     f"surroundings.face_faults[{number}].faces: the target has no face {name!r}; its faces are "
                     f"{', '.join(sorted(known))}"
                 )
-        self.triangles: Bools = np.array([bool(set(fault.faces) & set(_families(str(face)))) for face in faces])
+        concerned = [bool(set(fault.faces) & set(_families(str(face)))) for face in faces]
+        self.triangles: NDArray[np.bool_] = np.array(concerned)
         self.middles_m, self.low_m, self.high_m = self._middles_m()
         level = np.abs(mesh.normals[:, 2:]) > _LEVEL
         first = np.where(level, [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
@@ -79,13 +80,12 @@ class PlacedFault:
             ends += [float(low), float(high)]
         return middles, min(ends), max(ends)
 
-    def concerns(self, z_m: Floats) -> Bools:
-        """Return which heights (n,) are in the faces' part."""
-        wet = z_m < self.water_level_m
-        return np.ones(len(z_m), dtype=bool) if self.fault.part == "whole" else wet == (self.fault.part == "wet")
+    def plane(self) -> Floats:
+        """Return the gradient of the height by place and the height at the frame's origin, (t, 4), without the bow."""
+        at_origin = self.fault.shift_m - np.einsum("ij,ij->i", self.slopes, self.middles_m)
+        return np.where(self.triangles[:, None], np.column_stack([self.slopes, at_origin]), 0.0)
 
-    def heights_m(self, triangles: NDArray[np.int64], points_m: Floats) -> Floats:
-        """Return the heights (n,) at points (n, 3) of some triangles (n,)."""
-        slope = np.einsum("ij,ij->i", self.slopes[triangles], points_m - self.middles_m[triangles])
-        up = np.clip((points_m[:, 2] - self.low_m) / max(self.high_m - self.low_m, 1e-9), 0.0, 1.0)
-        return np.asarray(self.fault.shift_m + slope + self.fault.bow_m * 4 * up * (1 - up))
+    def bows_m(self, z_m: Floats) -> Floats:
+        """Return how far the bow stands out at heights (n,) of its faces."""
+        up = np.clip((z_m - self.low_m) / max(self.high_m - self.low_m, 1e-9), 0.0, 1.0)
+        return np.asarray(self.fault.bow_m * 4 * up * (1 - up))

@@ -43,12 +43,9 @@ class RayCaster:
         surfaces : (n,) array
             Number of the plane; -1: the ray meets nothing.
         """
-        ranges, triangles, hit = self._meet(origins_m, directions)
-        if self._relief:
-            rows = np.flatnonzero(hit)
-            parts = ranges[rows], triangles[rows], origins_m[rows], directions[rows]
-            ranges[rows] = self._relief.ranges(*parts)
-        return ranges, np.where(hit, self.mesh.surfaces[triangles], -1)
+        _, triangles = self.first_met(origins_m, directions)
+        ranges = self.ranges(triangles, origins_m, directions)
+        return ranges, np.where(np.isfinite(ranges), self.mesh.surfaces[triangles], -1)
 
     def normals(self, origins_m: Floats, directions: Floats) -> Floats:
         """Return the outward normal (n, 3), as designed, of the face that each ray meets first; zero if it meets none.
@@ -60,20 +57,34 @@ class RayCaster:
         directions : (n, 3) array
             Unit vectors, target frame.
         """
-        _, triangles, hit = self._meet(origins_m, directions)
-        return np.where(hit[:, None], self.mesh.normals[triangles], 0.0)
+        _, triangles = self.first_met(origins_m, directions)
+        return np.where((triangles >= 0)[:, None], self.mesh.normals[triangles], 0.0)
 
-    def _meet(self, origins_m: Floats, directions: Floats) -> tuple[Floats, NDArray[np.int64], NDArray[np.bool_]]:
-        """Return ranges to the planes of the triangles that rays meet first, the triangles, and which rays meet one."""
+    def first_met(self, origins_m: Floats, directions: Floats) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+        """Return how far (n,) m each ray goes until it meets the mesh as designed, and the triangle (n,) that it meets.
+
+        The way is right to 1e-6 of itself. A ray that meets nothing: inf and -1. Parameters are those of :meth:`cast`.
+        """
         rays = np.concatenate([origins_m, directions], axis=1, dtype=np.float32)
-        triangle = self._scene.cast_rays(self._tensor(rays))["primitive_ids"].numpy()
-        hit = triangle != self._no_triangle
-        index = np.where(hit, triangle, 0).astype(np.int64)
-        normals = self.mesh.normals[index]
+        met = self._scene.cast_rays(self._tensor(rays))
+        triangles = met["primitive_ids"].numpy()
+        hit = triangles != self._no_triangle
+        return np.where(hit, met["t_hit"].numpy(), np.float32(np.inf)), np.where(hit, triangles.astype(np.int64), -1)
+
+    def ranges(self, triangles: NDArray[np.int64], origins_m: Floats, directions: Floats) -> Floats:
+        """Return the ranges (n,) to the faces as built, by the triangles (n,) that the rays meet; inf for -1.
+
+        The other parameters are those of :meth:`cast`.
+        """
+        normals = self.mesh.normals[triangles]
         approach = np.einsum("ij,ij->i", normals, directions)
-        heights = self.mesh.distances_m[index] - np.einsum("ij,ij->i", normals, origins_m)
-        hit &= np.abs(approach) > 1e-9
-        return np.divide(heights, approach, out=np.full(len(rays), np.inf), where=hit), index, hit
+        heights = self.mesh.distances_m[triangles] - np.einsum("ij,ij->i", normals, origins_m)
+        hit = (triangles >= 0) & (np.abs(approach) > 1e-9)
+        ranges: Floats = np.divide(heights, approach, out=np.full(len(hit), np.inf), where=hit)
+        if self._relief:
+            rows = np.flatnonzero(hit)
+            ranges[rows] = self._relief.ranges(ranges[rows], triangles[rows], origins_m[rows], directions[rows])
+        return ranges
 
 
 @dataclass(frozen=True)

@@ -54,7 +54,10 @@ class Relief:
         self.mesh = mesh
         self.faces = np.array([face_of_polygon(target, polygon) for polygon in mesh.names])
         faults = enumerate(surroundings.face_faults)
-        self._faults = [PlacedFault(fault, k, self.faces, mesh, target.water_level_m) for k, fault in faults]
+        placed = [PlacedFault(fault, k, self.faces, mesh, target.water_level_m) for k, fault in faults]
+        self._bowed = [fault for fault in placed if fault.fault.bow_m]
+        of_part = [fault.plane() * np.array(fault.parts)[:, None, None] for fault in placed]
+        self._plane = sum(of_part, start=np.zeros((2, len(mesh.triangles), 4)))  # dry and wet: gradient, height at zero
         self._surroundings, self._water_level_m = surroundings, target.water_level_m
         fields = {"unevenness": surroundings.unevenness_m, "fouling": surroundings.fouling_sigma_m}
         self._fields = {
@@ -64,7 +67,8 @@ class Relief:
     def __bool__(self) -> bool:
         """Return whether any face stands off its plane."""
         settings = self._surroundings
-        return bool(self._faults) or max(settings.unevenness_m, settings.fouling_m, settings.fouling_sigma_m) > 0
+        added_m = (settings.unevenness_m, settings.fouling_m, settings.fouling_sigma_m)
+        return bool(self._plane.any() or self._bowed or max(added_m) > 0)
 
     def ranges(self, ranges_m: Floats, triangles: NDArray[np.int64], origins_m: Floats, directions: Floats) -> Floats:
         """Return the ranges (n,) to the faces as built, from those to the planes of the triangles that the rays meet.
@@ -79,16 +83,18 @@ class Relief:
 
     def heights_m(self, triangles: NDArray[np.int64], points_m: Floats) -> Floats:
         """Return the heights (n,) of the faces as built above their planes at points (n, 3) of some triangles (n,)."""
-        heights = np.zeros(len(points_m))
-        for fault in self._faults:
-            rows = np.flatnonzero(fault.triangles[triangles] & fault.concerns(points_m[:, 2]))
-            heights[rows] += fault.heights_m(triangles[rows], points_m[rows])
+        wet = points_m[:, 2] < self._water_level_m
+        plane = self._plane[wet.astype(np.int64), triangles]
+        heights: Floats = np.einsum("ij,ij->i", plane[:, :3], points_m) + plane[:, 3]
+        for fault in self._bowed:
+            rows = np.flatnonzero(fault.triangles[triangles] & np.where(wet, fault.parts[1], fault.parts[0]))
+            heights[rows] += fault.bows_m(points_m[rows, 2])
         settings, on_target = self._surroundings, self.faces[triangles] != ""
         if settings.unevenness_m:
             rows = np.flatnonzero(on_target)
             heights[rows] += settings.unevenness_m * self._fields["unevenness"].at(points_m[rows])
         if settings.fouling_m or settings.fouling_sigma_m:
-            rows = np.flatnonzero(on_target & (points_m[:, 2] < self._water_level_m))
+            rows = np.flatnonzero(on_target & wet)
             grown_m = np.full(len(rows), settings.fouling_m)
             if settings.fouling_sigma_m:
                 grown_m += settings.fouling_sigma_m * self._fields["fouling"].at(points_m[rows])

@@ -52,11 +52,11 @@ class WaterColumn:
         the ray. After a path r, its chord is turned upward by r g / 2c times this part. The part is split into the two
         directions in which ψ and τ of the ray grow. The mean sound speed down to a depth is g · depth / 2 higher.
         """
-        paths, _ = self.beams.paths(origins, R_target_from_mbes, swing, tilts)
+        ranges_m = self.beams.axis_ranges(origins, R_target_from_mbes, swing, tilts)
         up = R_target_from_mbes[:, 2, :]
         sideways = np.einsum("pi,pbi->pb", up, directions_in_mbes(swing + np.pi / 2, np.zeros_like(tilts)))
         ahead = np.einsum("pi,pbi->pb", up, directions_in_mbes(swing, tilts + np.pi / 2))
-        turn = self.gradient / (2 * self.speed) * np.where(np.isfinite(paths), paths, 0.0)
+        turn = self.gradient / (2 * self.speed) * np.where(np.isfinite(ranges_m), ranges_m, 0.0)
         swing, tilts = swing + turn * sideways / np.cos(tilts), tilts + turn * ahead
         paths, directions = self.beams.paths(origins, R_target_from_mbes, swing, tilts)
         depths = -directions[..., 2] * np.where(np.isfinite(paths), paths, 0.0)
@@ -68,12 +68,12 @@ class WaterColumn:
         """Return paths and directions in the profile, by rounds of chord and range."""
         start = directions_in_mbes(swing, tilts) @ R_target_from_mbes.transpose(0, 2, 1)
         depths = np.broadcast_to(self.water_level_m - origins[:, 2:], swing.shape)
-        paths, directions = self.beams.paths(origins, R_target_from_mbes, swing, tilts)
         for _ in range(_ROUNDS):
-            chords, _ = self._chords(depths, start, np.where(np.isfinite(paths), paths, 0.0))
+            ranges_m = self.beams.axis_ranges(origins, R_target_from_mbes, swing, tilts)
+            chords, _ = self._chords(depths, start, np.where(np.isfinite(ranges_m), ranges_m, 0.0))
             of_head = chords @ R_target_from_mbes
             swing, tilts = np.arctan2(of_head[..., 0], -of_head[..., 2]), np.arcsin(of_head[..., 1])
-            paths, directions = self.beams.paths(origins, R_target_from_mbes, swing, tilts)
+        paths, directions = self.beams.paths(origins, R_target_from_mbes, swing, tilts)
         there = np.isfinite(paths)
         _, times_s = self._chords(depths, start, np.where(there, paths, 0.0))
         return np.where(there, self.speed * times_s, paths), directions

@@ -95,9 +95,9 @@ def test_no_beam_is_narrower_than_the_aperture(changed: Change, noise_free: Scen
     seen: list[np.ndarray] = []
 
     class Watched(RayCaster):
-        def cast(self, origins_m: Any, directions: Any) -> Any:
+        def first_met(self, origins_m: Any, directions: Any) -> Any:
             seen.append(directions)
-            return super().cast(origins_m, directions)
+            return super().first_met(origins_m, directions)
 
     near = {"beam_deg": [0.5, 1.0], "point_beams": False, "sub_rays": [3, 3], "aperture_m": [0.2, 0.05]}
     scenario = changed(noise_free, mbes=near)

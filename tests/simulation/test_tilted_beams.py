@@ -139,9 +139,9 @@ def test_a_wide_beam_is_wide_in_both_angles(changed: Change, noise_free: Scenari
     seen: list[np.ndarray] = []
 
     class Watched(RayCaster):
-        def cast(self, origins_m: Any, directions: Any) -> Any:
+        def first_met(self, origins_m: Any, directions: Any) -> Any:
             seen.append(directions)
-            return super().cast(origins_m, directions)
+            return super().first_met(origins_m, directions)
 
     wide = {"beam_deg": [0.2, 0.3], "point_beams": False, "sub_rays": [3, 3]}
     scenario = changed(noise_free, mbes=wide)
