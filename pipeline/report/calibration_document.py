@@ -128,7 +128,7 @@ def pass_rows(passes: pd.DataFrame, water_levels: pd.DataFrame, cells: pd.DataFr
     return rows
 
 
-class _PlainDumper(yaml.SafeDumper):
+class _PlainDumper(yaml.CSafeDumper):
     """YAML dumper without anchors and aliases, which are hard to read: it writes repeated values in full."""
 
     def ignore_aliases(self, data: Any) -> bool:
