@@ -10,7 +10,6 @@ from scipy.stats import chi2
 from pipeline.adjustment.iteration import MountAdjustment, adjust_mount
 from pipeline.config.pool import Adjust
 from pipeline.maths.adjustment.parameters import State
-from tests.support.effort import often
 from tests.support.forward_points import NOISY, QUIET, error_of, made, problem, solved
 
 
@@ -27,9 +26,10 @@ def test_without_noise_the_truth_of_both_heads_comes_back() -> None:
     assert np.abs(error_of(found)).max() < 1e-7
 
 
+@pytest.mark.thorough
 def test_errors_of_both_heads_are_as_large_as_their_common_covariance_says() -> None:
     """Mean normalised squared error of the twelve, and of the heads' difference, where the cross-covariance counts."""
-    repeats = often(8, 40)
+    repeats = 40
     of_both, of_difference = [], []
     difference = np.hstack([np.eye(6), -np.eye(6)])
     for seed in range(300, 300 + repeats):

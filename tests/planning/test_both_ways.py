@@ -65,6 +65,7 @@ def test_a_slope_beside_the_wall_tells_the_height(lean_m: float, told: bool) -> 
     assert any("no horizontal face" in gap for gap in found) is not told
 
 
+@pytest.mark.thorough
 def test_a_mirrored_pass_is_as_good() -> None:
     """The dock is its own mirror image: so a boat that is mirrored, too, and sails back, learns the same."""
     near, far = {"distance_m": 4.0}, {"distance_m": 7.0}

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.support.docks import BOTH_SIDES, LOCK, MOUNT
+from tests.support.effort import often
 from tests.support.simulated import QUIET, calibrated, made, without_biases
 
 EXACT_DEG, EXACT_MM = 1e-4, 0.01
@@ -27,7 +28,7 @@ COURSES: dict[str, tuple[dict[str, Any], ...]] = {
 }
 
 
-@pytest.mark.parametrize("course", COURSES)
+@pytest.mark.parametrize("course", often(["to port", "both ways", "circle"], COURSES))
 def test_without_noise_the_truth_comes_back(course: str, errors_of: Any) -> None:
     session = without_biases(made(QUIET, *COURSES[course], seed=5))
     found = calibrated(session)

@@ -151,6 +151,7 @@ def test_a_head_that_sees_nothing_in_the_passes_of_the_first_is_refused(noisy_tw
         calibrated(noisy_two, raw=raw)
 
 
+@pytest.mark.thorough
 def test_soundings_outside_the_passes_of_the_first_head_are_counted(noisy_two: SimulatedSession) -> None:
     """The first head records no second pass; what the second saw there is left out, and said."""
     start, end = (noisy_two.truth["passes"][1][key] for key in ("start_ns", "end_ns"))

@@ -150,6 +150,7 @@ def test_noise_of_outer_beams_is_told_and_not_taken_for_a_thing() -> None:
     assert "many_outliers" in json.loads(found["report/calibration.json"])["warning_codes"]
 
 
+@pytest.mark.thorough
 def test_growth_on_the_walls_widens_the_sigmas_until_they_are_true(errors_of: Any) -> None:
     growth = {"fouling_m": 0.03, "fouling_sigma_m": 0.02, "unevenness_length_m": 0.3, "back_wall": False}
     session, found, result = at(SLIP, {"surroundings": growth})
