@@ -27,7 +27,7 @@ from pipeline.target.design import target_of
 from tools.campaign_files import collect_rows
 from tools.campaigns import DRIFT, TASKS_OF_A_WORKER
 from tools.drawn_errors import errors_at
-from tools.place_pages import summary, summary_of_noise, summary_of_rough
+from tools.place_pages import SEEDS_OF_A_PLACE, summary, summary_of_noise, summary_of_rough
 from tools.places import PLACES, scenario_of_place
 from tools.rough_walls import drawn_into, drawn_names, longest_wall, masks_of_things
 from tools.session_rows import error_columns, poolcal
@@ -176,7 +176,7 @@ def main() -> None:
     given = parser.parse_args()
     tables = []
     for place in given.only or (ROUGH_PLACES if given.rough else PLACES):
-        first = FIRST_SEED + 1000 * list(PLACES).index(place) + given.first
+        first = FIRST_SEED + SEEDS_OF_A_PLACE * list(PLACES).index(place) + given.first
         planned = given.sessions if given.rough else 0 if given.noise else PLANNED
         tasks = [
             Task(place, first + k, planned=k < planned, rough=given.rough, noise=given.noise)

@@ -8,13 +8,14 @@ from tools.campaign_statistics import HEAD as STATISTICS_HEAD
 from tools.campaign_statistics import markdown_row, nse_band, statistics_of
 from tools.session_rows import NAMES
 
+SEEDS_OF_A_PLACE = 1000
 HEAD = """# Places that nobody has drawn
 
-Made by `python -m tools.place_campaign`, {sessions} sessions of each place. In each session `kind: found` finds the
-target in the laser's points. The INS drifts; all errors of the sensors are drawn by their sigmas; below the water each
-wall is off by 2 cm and 0.1°, and all are by 1.5 cm of growth (1 sigma), which nobody knows. The limits are those of
-`purpose: special_order`: 20 m, 60°. The lock is passed both ways with a head that looks down, the others one way with a
-head that looks to starboard.
+Made by `python -m tools.place_campaign{first}`, {sessions} sessions of each place. In each session `kind: found`
+finds the target in the laser's points. The INS drifts; all errors of the sensors are drawn by their sigmas; below the
+water each wall is off by 2 cm and 0.1°, and all are by 1.5 cm of growth (1 sigma), which nobody knows. The limits are
+those of `purpose: special_order`: 20 m, 60°. The lock is passed both ways with a head that looks down, the others one
+way with a head that looks to starboard.
 
 """
 EXPLAINED = """
@@ -36,7 +37,9 @@ def summary(table: pd.DataFrame) -> str:
     lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
     lines += [_line(str(place), rows) for place, rows in table.groupby("place", sort=False)]
     sessions, planned = (int(table.groupby("place")[name].count().max()) for name in ("seed", "planned_roll"))
-    return HEAD.format(sessions=sessions) + "\n".join(lines) + "\n" + EXPLAINED.format(planned=planned)
+    first = int(table["seed"].min()) % SEEDS_OF_A_PLACE
+    head = HEAD.format(sessions=sessions, first=f" --first {first}" if first else "")
+    return head + "\n".join(lines) + "\n" + EXPLAINED.format(planned=planned)
 
 
 def _line(place: str, rows: pd.DataFrame) -> str:
