@@ -80,14 +80,9 @@ class Iterate:
         return Iterate(linearisation, drift, self.priors), solution
 
     def record_noise(self, noise: PoseNoise) -> EpochVarianceFactor:
-        """Return the variance factor of the records' white noise, from the laser's points; without them unknown.
-
-        The points are taken as the INS placed them: the estimated drift has taken a part of the noise for its own.
-        """
+        """Return the variance factor of the records' white noise, from the laser's points; without them unknown."""
         if "laser" not in self.linearisation.sums:
             return EpochVarianceFactor(1.0, np.inf)
-        state, sums = self.linearisation.state, {"laser": self.linearisation.sums["laser"]}
-        back = DriftEstimate(self.drift.knots, -self.drift.values)
-        as_placed = updated_sums(replace(self.linearisation, sums=sums), np.zeros(state.size), back)["laser"]
-        designs = pose_design(state.surfaces, np.arange(len(state.surfaces)))
-        return record_noise_factor(as_placed, designs, noise.white)
+        surfaces = self.linearisation.state.surfaces
+        designs = pose_design(surfaces, np.arange(len(surfaces)))
+        return record_noise_factor(self.linearisation.sums["laser"], designs, noise.white)

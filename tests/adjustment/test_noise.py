@@ -1,22 +1,18 @@
 """Noise that differs from face to face, or that soundings share: weights, sigmas, and what the tables say of it."""
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
 from scipy.stats import chi2
 
-from pipeline.adjustment.iterate import Iterate
 from pipeline.adjustment.iteration import MountAdjustment, adjust_mount
 from pipeline.adjustment.noise_tables import groups_table, sigma_check
 from pipeline.artefacts.streams import MemoryPart, Stream
 from pipeline.config.pool import Adjust
-from pipeline.maths.adjustment.normal_equations import updated_sums
-from pipeline.maths.adjustment.pose_errors import DriftEstimate, PoseNoise
 from tests.support.effort import often
-from tests.support.forward_points import NOISY, QUIET, columns, error_of, made, problem, solved
+from tests.support.forward_points import QUIET, columns, error_of, made, problem
 
 REPEATS = often(8, 60)
 SLANTED = (0, 2)  # faces P1 and P3
@@ -108,17 +104,3 @@ def test_without_a_solution_there_is_no_check() -> None:
         wall = part.columns["face"] == 1
         streams[name] = Stream((MemoryPart(part.name, {k: v[wall] for k, v in part.columns.items()}),))
     assert sigma_check(adjust_mount(problem(model, QUIET), streams, Adjust(), 5.0)).empty
-
-
-def test_the_estimated_drift_takes_nothing_from_the_white_noise_of_the_ins() -> None:
-    """It follows the noise a little. Whatever it is, the noise comes from the points as the INS placed them."""
-    last, noise = solved(3, NOISY).last, PoseNoise(np.array([2e-3] * 3 + [3.5e-5] * 3), np.zeros(6), 1.0)
-    found = last.record_noise(noise)
-    step = np.zeros(last.linearisation.state.size)
-    for share in (-1.0, 0.5):  # without any drift, and with half as much again
-        further = DriftEstimate(last.drift.knots, share * last.drift.values)
-        moved = replace(last.linearisation, sums=updated_sums(last.linearisation, step, further))
-        other = Iterate(moved, last.drift.updated(further.values), last.priors)
-        assert other.record_noise(noise).factor == pytest.approx(found.factor, rel=1e-9)
-        by_residuals = replace(other, drift=DriftEstimate(last.drift.knots, 0.0 * last.drift.values))
-        assert (abs(by_residuals.record_noise(noise).factor / found.factor - 1) > 1e-3) == (share > 0)

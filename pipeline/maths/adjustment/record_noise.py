@@ -9,12 +9,13 @@ Take two intervals i and j of one surface, i before j. If j is the very next int
 
 with own = 1 / Σ w, and otherwise c = ((1 - s_i)² + s_i²) |g_i|² + ((1 - s_j)² + s_j²) |g_j|². Within
 :data:`LARGEST_STEP` records the drift hardly changes: by √(q t), with q = 2 σ² / τ, that is 0.2 mm in 25 ms at 15 mm
-and 200 s, and 2 mm of white noise are looked for: f grows by 1 %. The residuals are to be those without the estimated
-drift, which has taken a part of the noise: with knots 0.12 s apart their mean square is 7 % too small, and f 2 %. f
-follows by regression with the weights of maximum likelihood, c / (own_i + own_j + f c)², over all such pairs. Pairs are
-not independent. Neighbours in a sequence of differences have a correlation of -1/2, and the squares of these add half
-to the variance of f. The stated sigma is that of the pairs of neighbours alone: the others, which repeat their
-information in part, take up to a third off it.
+and 200 s, and 2 mm of white noise are looked for. So f does not grow if the INS drifts faster than its figures say. The
+residuals are those without the estimated drift, which has taken a part of the noise: with knots 0.12 s apart their mean
+square is 7 % too small, but that of these differences, and f, only 2 %. (With the drift left in them, f would count all
+that an INS of 10 records a second drifts in half a second.) f follows by regression with the weights of maximum
+likelihood, c / (own_i + own_j + f c)², over all such pairs. Pairs are not independent. Neighbours in a sequence of
+differences have a correlation of -1/2, and the squares of these add half to the variance of f. The stated sigma is that
+of the pairs of neighbours alone: the others, which repeat their information in part, take up to a third off it.
 """
 
 import numpy as np
@@ -36,7 +37,7 @@ def record_noise_factor(sums: Intervals, pose_designs: Array, white: Array) -> E
     Parameters
     ----------
     sums : Intervals
-        The laser's intervals at the adjusted values, without the estimated drift.
+        The laser's intervals, at the adjusted values.
     pose_designs : (s, 3, 6) array
         Design K of pose errors by surface.
     white : (6,) array
