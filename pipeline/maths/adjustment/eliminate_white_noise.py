@@ -3,7 +3,7 @@
 Knots (of the drift) lie at records. Within a span between two knots the noise w_k of the records forms a chain, because
 each interval between two records depends on two neighbours only. The records are eliminated one after the other (block
 Thomas), all spans side by side. The Schur complement, which remains, depends on the parameters x and the span's two
-knots. The record at a knot counts as two, one in each span: one record in a hundred.
+knots. The record at a knot counts as two, one in each span: one record in ten at 100 a second.
 
 The observed value v is a last column. So every Schur complement of the matrix [A v]ᵀ P [A v] contains the right side of
 the normal equations too, and the Σ p v² that remains after least squares.
