@@ -8,7 +8,7 @@ from tools.campaign_statistics import HEAD as STATISTICS_HEAD
 from tools.campaign_statistics import markdown_row, nse_band, statistics_of
 from tools.session_rows import NAMES
 
-SEEDS_OF_A_PLACE = 1000
+SEEDS_OF_A_PLACE = 1000  # the first of each place is a multiple of it
 HEAD = """# Places that nobody has drawn
 
 Made by `python -m tools.place_campaign{first}`, {sessions} sessions of each place. In each session `kind: found`

@@ -132,6 +132,9 @@ class BeamBundles:
         is the weighted mean over its rays, which differ by parts of the receive width in θ and of the transmit width in
         τ. (From sin θ = cos τ sin ψ: dψ = √(1 + l²) dθ + l sin ψ dτ with l = tan τ / cos ψ.)
 
+        Which plane a ray meets, and whether under water, is judged on the mesh as designed; of the rays that count, one
+        that the faces as built bring out of the water is dropped.
+
         Parameters
         ----------
         origins_m : (p, 3) array
@@ -169,6 +172,7 @@ class BeamBundles:
         rows = np.flatnonzero(needed)
         paths[rows] = self.caster.ranges(triangles[rows], origins[rows], flat[rows])
         wet[rows] = self._wet(paths[rows], origins[rows], flat[rows])
+        rows = rows[wet[rows]]
         if self.projector_m.any():
             points_mbes = paths[rows, None] * direction_mbes.reshape(-1, 3)[rows]
             paths[rows] = (paths[rows] + np.linalg.norm(points_mbes - self.projector_m, axis=1)) / 2

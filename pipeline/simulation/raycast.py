@@ -63,7 +63,8 @@ class RayCaster:
     def first_met(self, origins_m: Floats, directions: Floats) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
         """Return how far (n,) m each ray goes until it meets the mesh as designed, and the triangle (n,) that it meets.
 
-        The way is right to 1e-6 of itself. A ray that meets nothing: inf and -1. Parameters are those of :meth:`cast`.
+        The way is right to some micrometres over the cosine of incidence. A ray that meets nothing: inf and -1.
+        Parameters are those of :meth:`cast`.
         """
         rays = np.concatenate([origins_m, directions], axis=1, dtype=np.float32)
         met = self._scene.cast_rays(self._tensor(rays))

@@ -49,8 +49,9 @@ class WaterColumn:
         """Return paths and directions where the sound speed grows evenly with depth.
 
         With dc/d(depth) = g, a ray curves upward by g/c per metre, times the part of the vector "up" that is normal to
-        the ray. After a path r, its chord is turned upward by r g / 2c times this part. The part is split into the two
-        directions in which ψ and τ of the ray grow. The mean sound speed down to a depth is g · depth / 2 higher.
+        the ray. After a range r, to what its axis meets, its chord is turned upward by r g / 2c times this part. The
+        part is split into the two directions in which ψ and τ of the ray grow. The mean sound speed down to a depth is
+        g · depth / 2 higher.
         """
         ranges_m = self.beams.axis_ranges(origins, R_target_from_mbes, swing, tilts)
         up = R_target_from_mbes[:, 2, :]

@@ -66,7 +66,7 @@ def test_a_plan_that_knows_of_it_predicts_the_sigmas(overgrown: tuple[Any, dict[
     assert np.exp(np.mean(np.log(before))) > 2
 
 
-def test_rough_dry_faces_count_as_rough_wet_ones_do() -> None:
+def test_rough_dry_faces_make_sigmas_larger_and_rough_wet_ones_more() -> None:
     """The laser sees a wall of stones as rough as the sonar does: it makes the total sigmas larger, and both more."""
     distances = DISTANCES[:2]
     session = made(copy.deepcopy(DOCK), {"track": {"distances_m": list(distances)}}, seed=6)
