@@ -66,14 +66,15 @@ def test_a_plan_that_knows_of_it_predicts_the_sigmas(overgrown: tuple[Any, dict[
     assert np.exp(np.mean(np.log(before))) > 2
 
 
-def test_rough_dry_faces_make_sigmas_larger_and_rough_wet_ones_more() -> None:
-    """The laser sees a wall of stones as rough as the sonar does: it makes the total sigmas larger, and both more."""
+def test_rough_dry_faces_count_as_rough_wet_ones_do() -> None:
+    """The laser sees a wall of stones as rough as the sonar does: each makes the total sigmas larger, both more."""
     distances = DISTANCES[:2]
     session = made(copy.deepcopy(DOCK), {"track": {"distances_m": list(distances)}}, seed=6)
     rough = {"roughness_m": 0.004, "dry_roughness_m": 0.004}
-    smooth, dry, both = (
+    smooth, wet, dry, both = (
         np.array(list(planned(session, "sigma_mount_total", distances, **one).values()))
-        for one in ({}, {"dry_roughness_m": 0.004}, rough)
+        for one in ({}, {"roughness_m": 0.004}, {"dry_roughness_m": 0.004}, rough)
     )
+    assert np.all(wet > smooth)
     assert np.all(dry > smooth)
-    assert np.all(both > dry)
+    assert np.all(both > np.maximum(wet, dry))
