@@ -13,6 +13,7 @@ import argparse
 import json
 import tempfile
 from dataclasses import dataclass
+from math import cos, radians
 from pathlib import Path
 from typing import Any
 
@@ -79,7 +80,7 @@ def row_of(task: Task) -> dict[str, Any]:
         found = json.loads((run / "found.json").read_text("utf-8"))["found"]
         if task.planned:
             known = _as_it_is(found, scenario, row["fault"]) if task.rough else found
-            row |= _predicted(session, known, scenario, purpose, calibration["mbes"]["mount"])
+            row |= _predicted(run, known, scenario, purpose, calibration["mbes"]["mount"])
         if task.rough:
             row |= _left_out(calibration, found["target"], scenario["target"])
     row |= {"verdict": calibration["verdict"], "reasons": " | ".join(calibration["reasons"])}
@@ -98,21 +99,21 @@ def _left_out(calibration: dict[str, Any], found: dict[str, Any], drawn: dict[st
 
 
 def _predicted(
-    session: Path, found: dict[str, Any], scenario: dict[str, Any], purpose: str, mount: dict[str, float] | None
+    run: Path, found: dict[str, Any], scenario: dict[str, Any], purpose: str, mount: dict[str, float] | None
 ) -> dict[str, Any]:
-    """Return the total sigmas that ``poolcal plan`` predicts for these passes at the found faces, deg and mm.
+    """Return the total sigmas that ``poolcal plan`` predicts for a run's passes at the found faces, deg and mm.
 
     allowed: whether they, and what they make of soundings, are within the limits. mount: that the session gave, because
     walls of one direction show yaw by its sine; None: the coarse one.
     """
-    pool, plan, out, place = (session.parent / name for name in ("found.yaml", "plan.yaml", "planned.yaml", "planned"))
-    settled = yaml.safe_load((session / "session.yaml").read_text("utf-8"))
+    pool, plan, out, place = (run.parent / name for name in ("found.yaml", "plan.yaml", "planned.yaml", "planned"))
+    settled = yaml.safe_load((run.parent / "session" / "session.yaml").read_text("utf-8"))
     settled["mbes"]["mount"] = mount or settled["mbes"]["mount"]
     place.mkdir()
     (place / "session.yaml").write_text(yaml.safe_dump(settled), encoding="utf-8")
     pool.write_text(yaml.safe_dump(found | {"verdict": {"purpose": purpose}}), encoding="utf-8")
     settings = parse(Scenario, scenario, "place")
-    courses, motion = settings.track.courses, settings.motion
+    motion, sailed = settings.motion, pd.read_parquet(run / "ingest" / "passes.parquet")
     content = {
         "ins_rate_hz": settings.ins.rate_hz,
         "unrest": {
@@ -125,12 +126,14 @@ def _predicted(
         "laser": settings.laser.model_dump(include={"point_rate_hz", "line_rate_hz", "field_deg"}, mode="json"),
         "mbes": settings.mbes.model_dump(include={"ping_rate_hz", "sector_deg"}, mode="json"),
         "passes": [
-            {
-                "distance_m": distance,
-                "course": courses[k % len(courses)],
+            {  # seen from the found target: its wall is the largest one, which may stand before or behind the drawn one
+                "distance_m": one["distance_m"],
+                "course": "along" if cos(radians(one["azimuth_deg"] - found["target"]["azimuth_deg"])) > 0 else "back",
+                "speed_m_s": abs(one["speed_m_s"]),
                 "heading_swing_deg": motion.heading.amplitude,
+                "half_length_m": abs(one["length_m"]) / 2,
             }
-            for k, distance in enumerate(settings.track.distances_m)
+            for one in sailed.to_dict("records")
         ],
     }
     plan.write_text(yaml.safe_dump(content), encoding="utf-8")

@@ -21,10 +21,9 @@ way with a head that looks to starboard.
 EXPLAINED = """
 The normalised squared error (NSE) by the total covariance is 6 in the mean if the sigmas are true. A session of which a
 test or a search says that something is wrong is rejected, and its NSE stands in the last column but one, not in the
-first. "Plan" is the total sigma that `poolcal plan` predicts for the same passes and the same unrest, at the faces that
-the session found, with the mount that it gave (walls that look one way show yaw by its sine); of the ratios of the
-first {planned} sessions this is the median. The plan lets each ping fall anywhere between the INS's records and the
-laser's lines; the simulated clocks keep one phase, which moves y and z by a tenth.
+first. "Plan" is the total sigma that `poolcal plan` predicts for the passes as they were sailed (distance from the
+found wall, speed, length) and the same unrest, at the faces that the session found, with the mount that it gave (walls
+that look one way show yaw by its sine); of the ratios of the first {planned} sessions this is the median.
 """
 
 

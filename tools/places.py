@@ -14,10 +14,10 @@ from pipeline.maths.geometry.geodesy import PoolFrame
 Corners = list[list[float]]
 FOOT_M, TOP_M = -4.0, 2.0
 TRACK: dict[str, Any] = {"distances_m": [4.0, 7.0, 5.0, 6.0], "half_length_m": 6.0}
-RATES: dict[str, Any] = {
+RATES: dict[str, Any] = {  # without a common phase: pings and lines fall anywhere between the INS's records
     "ins": {"rate_hz": 100.0},
-    "laser": {"point_rate_hz": 8000.0, "line_rate_hz": 20.0},
-    "mbes": {"ping_rate_hz": 10.0},
+    "laser": {"point_rate_hz": 8000.0, "line_rate_hz": 19.3},
+    "mbes": {"ping_rate_hz": 9.7},
 }
 MOUNT = {"pitch_deg": 1.2, "yaw_deg": -2.0, "x_m": 0.30, "y_m": 0.20, "z_m": -2.01}
 BOTH_SIDES: dict[str, Any] = {  # a head that looks down, a scanner that sees both sides, and passes both ways

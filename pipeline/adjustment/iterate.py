@@ -15,7 +15,7 @@ from pipeline.maths.adjustment.pose_errors import DriftEstimate, PoseNoise
 from pipeline.maths.adjustment.pseudo_observations import Prior, PseudoObservations, all_pseudo_observations
 from pipeline.maths.adjustment.record_noise import record_noise_factor
 from pipeline.maths.adjustment.solution import Solution, solve
-from pipeline.maths.adjustment.weighting import EpochVarianceFactor
+from pipeline.maths.adjustment.weighting import EpochVarianceFactor, Weighting
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -79,10 +79,13 @@ class Iterate:
         linearisation = replace(self.linearisation, sums=sums, state=state.updated(step), drift=drift)
         return Iterate(linearisation, drift, self.priors), solution
 
-    def record_noise(self, noise: PoseNoise) -> EpochVarianceFactor:
-        """Return the variance factor of the records' white noise, from the laser's points; without them unknown."""
+    def record_noise(self, noise: PoseNoise, weighting: Weighting) -> EpochVarianceFactor:
+        """Return the variance factor of the records' white noise, from the laser's points; without them unknown.
+
+        ``weighting``: that of the sums.
+        """
         if "laser" not in self.linearisation.sums:
             return EpochVarianceFactor(1.0, np.inf)
         surfaces = self.linearisation.state.surfaces
         designs = pose_design(surfaces, np.arange(len(surfaces)))
-        return record_noise_factor(self.linearisation.sums["laser"], designs, noise.white)
+        return record_noise_factor(self.linearisation.sums["laser"], designs, noise.white, weighting.mean_kept)

@@ -133,7 +133,7 @@ def adjust_mount(
     factors = dict[str, EpochVarianceFactor]()
     if not weighted.deficient:
         # take the INS's noise from the data: white noise, then drift; further steps have the last weights
-        laser = last.record_noise(prior.noise)
+        laser = last.record_noise(prior.noise, weighted.weighting)
         last, pings = _with_ping_noise(last, prior.noise.white, laser)
         factors |= {"laser": laser} | {head: ping.epoch for head, ping in pings.items()}
         noise = noise_seen_by_laser(prior.noise, laser)

@@ -139,7 +139,7 @@ def weighted_iteration(
         # from the next reading on reduce the weights of outliers
         weighting = replace(weighting, robust=(settings.robust_k0, settings.robust_k1))
         if iteration > 1:  # scales and the INS's white noise come from residuals without the drift and outliers
-            white = noise_seen_by_laser(prior.noise, stepped.record_noise(prior.noise)).white
+            white = noise_seen_by_laser(prior.noise, stepped.record_noise(prior.noise, weighting)).white
             weighting = replace(weighting, scales=accumulation.robust_scales(len(state.surfaces)), white=white)
         values = CurrentValues(stepped.linearisation.state, stepped.drift, weighting)
         del accumulation, linearisation, start, stepped  # the next reading needs their memory

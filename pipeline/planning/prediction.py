@@ -55,12 +55,12 @@ class PassSums:
 class PredictedPasses:
     """Prediction for passes: normal matrix (u, u) of all parameters; points by sensor and face, and time, by pass.
 
-    with_faces (u + f, u + f): the normal matrix with the shifts of single faces after all others; None if they are left
-    out.
+    Normal matrix and points are means over the phases of the boat's unrest. with_faces: by phase, the normal matrix
+    (u + f, u + f) with the shifts of single faces after all others; none if they are left out.
     """
 
     normal: Array
-    with_faces: Array | None
+    with_faces: tuple[Array, ...]
     points: list[dict[str, Array]]
     seconds: list[float]
 
@@ -74,8 +74,8 @@ def predict(
 ) -> PredictedPasses:
     """Return the prediction for passes that are sailed one after the other.
 
-    It is an average over several phases of the boat's unrest, because the heading at the moment when the fan passes a
-    block is random.
+    Several phases of the boat's unrest are predicted, because the heading at the moment when the fan passes a block is
+    random.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def predict(
         {sensor: np.mean([sums[k].points[sensor] for sums in averaged], axis=0) for sensor in first[k].points}
         for k in range(len(passes))
     ]
-    with_faces = normal if single_faces else None
+    with_faces = tuple(normals) if single_faces else ()
     return PredictedPasses(normal[:size, :size], with_faces, points, [sums.seconds for sums in first])
 
 
@@ -209,7 +209,7 @@ def _trajectory(setting: PredictionSetting, planned: Pass, seconds: float, numbe
     period = unrest.period_s
     x = wave(unrest.sway_m, 2 * period, 0) - planned.distance_m
     sense = 1.0 if planned.course == "along" else -1.0
-    y = sense * (planned.speed_m_s * t - half)
+    y = setting.middle_m + sense * (planned.speed_m_s * t - half)
     z = wave(unrest.heave_m, 0.9 * period, 1) + setting.model.water_level_m + plan.ins_height_m
     roll = wave(np.radians(unrest.roll_deg), period, 2)
     pitch = wave(np.radians(unrest.pitch_deg), 0.85 * period, 3)

@@ -40,10 +40,16 @@ class PredictionSetting:
     roughness_length_m: float = 0.0
 
     @property
-    def half_length_m(self) -> float:
-        """Length of a pass on either side of the target's centre."""
+    def middle_m(self) -> float:
+        """The target's middle along its y axis, by which the passes go: the origin may stand at its end."""
         low, high = self.model.bounds()
-        return float(max(-low[1], high[1])) + BEYOND_M
+        return float(low[1] + high[1]) / 2
+
+    @property
+    def half_length_m(self) -> float:
+        """Length of a pass on either side of the target's middle."""
+        low, high = self.model.bounds()
+        return float(high[1] - low[1]) / 2 + BEYOND_M
 
     def areas_m2(self, *, wet: bool) -> Array:
         """Return the area (s,) of each surface's faces under water, or above it."""

@@ -83,6 +83,21 @@ def test_echoes_of_the_water_move_no_plane_and_no_outline() -> None:
     assert water_level_m([plane]) == pytest.approx(WATER_M, abs=0.05)
 
 
+@pytest.mark.parametrize("behind", [1.0, -1.0])
+def test_a_pan_of_sheet_piling_ends_at_its_webs(behind: float) -> None:
+    """Webs at 45°, to the back of the pan or to its front: their first centimetres lie near its plane."""
+    pan = np.concatenate([wall(1.2, 3.0, seed=seed) for seed in range(4)])
+    web = np.concatenate([wall(0.64, 3.0, seed=seed) for seed in range(4)])
+    along = (web[:, 1] - FAR[1]) * np.sqrt(0.5)  # from -0.225 to 0.225 m, as far as it goes back
+    webs = [
+        np.column_stack([web[:, 0] + behind * (0.225 + along), FAR[1] + end * (0.825 + along), web[:, 2]])
+        for end in (-1.0, 1.0)
+    ]
+    plane = next(p for p in dry_planes(np.concatenate([pan, *webs]), BOAT) if abs(p.normal[0]) > 0.99)
+    corners = plane.corners_m(plane.outline_m)[:, 1] - FAR[1]
+    np.testing.assert_allclose([corners.min(), corners.max()], [-0.6, 0.6], atol=0.008)
+
+
 def test_a_plane_of_few_points_is_chance() -> None:
     """Beside a wall with 3000 points a square metre a small one with 600 serves, one with 200 does not."""
     dense = np.concatenate([wall(8.0, 3.0, seed=seed) for seed in range(5)])

@@ -42,6 +42,13 @@ def test_the_noise_is_found_beside_a_drift_of_many_times_its_size(factor: float,
     assert found.sigma < 0.05 + 0.1 * factor
 
 
+def test_what_robust_weights_take_off_the_means_is_given_back() -> None:
+    sums = intervals(np.arange(300), 1.0, drift=0.1)
+    whole, reduced = (record_noise_factor(sums, POSES, WHITE, kept) for kept in (1.0, 0.5))
+    assert reduced.factor == pytest.approx(4 * whole.factor, rel=0.01)
+    assert reduced.sigma == pytest.approx(4 * whole.sigma, rel=0.01)
+
+
 def test_without_pairs_or_noise_nothing_is_known() -> None:
     far = np.arange(0, 600, 6)
     for sums, white in ((intervals(far, 1.0, 0.1), WHITE), (intervals(np.arange(100), 1.0, 0.1), 0 * WHITE)):
