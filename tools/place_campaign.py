@@ -29,7 +29,7 @@ from tools.campaign_files import collect_rows
 from tools.campaigns import DRIFT, TASKS_OF_A_WORKER
 from tools.drawn_errors import errors_at
 from tools.place_pages import SEEDS_OF_A_PLACE, summary, summary_of_noise, summary_of_rough
-from tools.places import PLACES, scenario_of_place
+from tools.places import PLACES, frame_of, scenario_of_place
 from tools.rough_walls import drawn_into, drawn_names, longest_wall, masks_of_things
 from tools.session_rows import error_columns, poolcal
 
@@ -114,6 +114,8 @@ def _predicted(
     pool.write_text(yaml.safe_dump(found | {"verdict": {"purpose": purpose}}), encoding="utf-8")
     settings = parse(Scenario, scenario, "place")
     motion, sailed = settings.motion, pd.read_parquet(run / "ingest" / "passes.parquet")
+    here, drawn = frame_of(found["target"]), frame_of(scenario["target"])
+    middle_m = float(here.points_from_ecef(drawn.points_to_ecef(np.zeros((1, 3))))[0, 1])
     content = {
         "ins_rate_hz": settings.ins.rate_hz,
         "unrest": {
@@ -126,12 +128,13 @@ def _predicted(
         "laser": settings.laser.model_dump(include={"point_rate_hz", "line_rate_hz", "field_deg"}, mode="json"),
         "mbes": settings.mbes.model_dump(include={"ping_rate_hz", "sector_deg"}, mode="json"),
         "passes": [
-            {  # seen from the found target: its wall is the largest one, which may stand before or behind the drawn one
+            {  # seen from the found target, whose origin is on its own largest wall
                 "distance_m": one["distance_m"],
                 "course": "along" if cos(radians(one["azimuth_deg"] - found["target"]["azimuth_deg"])) > 0 else "back",
                 "speed_m_s": abs(one["speed_m_s"]),
                 "heading_swing_deg": motion.heading.amplitude,
                 "half_length_m": abs(one["length_m"]) / 2,
+                "middle_m": middle_m,
             }
             for one in sailed.to_dict("records")
         ],

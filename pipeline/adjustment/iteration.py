@@ -21,6 +21,7 @@ from pipeline.maths.adjustment.eliminate_white_noise import ReducedIntervals
 from pipeline.maths.adjustment.parameters import State, kind_of
 from pipeline.maths.adjustment.ping_noise import PingNoise, ping_noise, with_ping_noise
 from pipeline.maths.adjustment.pose_errors import DriftEstimate, PoseNoise
+from pipeline.maths.adjustment.robust_weights import RobustMeans
 from pipeline.maths.adjustment.roughness import Roughness
 from pipeline.maths.adjustment.solution import Solution, solve
 from pipeline.maths.adjustment.weighting import (
@@ -134,7 +135,7 @@ def adjust_mount(
     if not weighted.deficient:
         # take the INS's noise from the data: white noise, then drift; further steps have the last weights
         laser = last.record_noise(prior.noise, weighted.weighting)
-        last, pings = _with_ping_noise(last, prior.noise.white, laser)
+        last, pings = _with_ping_noise(last, prior.noise.white, laser, weighted.weighting.of_means)
         factors |= {"laser": laser} | {head: ping.epoch for head, ping in pings.items()}
         noise = noise_seen_by_laser(prior.noise, laser)
         for _ in range(ROUGH_ROUNDS if prior.from_start else 1):
@@ -173,7 +174,9 @@ def _closed(last: Iterate, noise: PoseNoise, estimated: Integers, reduced: Reduc
     return last, False
 
 
-def _with_ping_noise(last: Iterate, white: Array, laser: EpochVarianceFactor) -> tuple[Iterate, dict[str, PingNoise]]:
+def _with_ping_noise(
+    last: Iterate, white: Array, laser: EpochVarianceFactor, robust: RobustMeans
+) -> tuple[Iterate, dict[str, PingNoise]]:
     """Return the values with the noise that the soundings of a ping share in their sums; and this noise by head.
 
     Parameters
@@ -184,12 +187,14 @@ def _with_ping_noise(last: Iterate, white: Array, laser: EpochVarianceFactor) ->
         Standard deviations of a record's white noise, m and rad.
     laser : EpochVarianceFactor
         Variance factor of this noise, from the laser's points.
+    robust : RobustMeans
+        What robust weights do to the means of the soundings.
     """
     pings = {}
     for head, soundings in last.linearisation.sums.items():
         if kind_of(head) == "mbes":
             surfaces = last.linearisation.state.surfaces
-            pings[head] = ping_noise(soundings, surfaces, white, laser)
+            pings[head] = ping_noise(soundings, surfaces, white, laser, robust)
             with_pings = soundings.stored(partial(with_ping_noise, noise=pings[head], surfaces=surfaces, white=white))
             last = replace(last, linearisation=last.linearisation.with_sums(head, with_pings))
     return last, pings

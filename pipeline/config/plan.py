@@ -52,6 +52,7 @@ class Pass(Model):
     speed_m_s: Annotated[float, Field(ge=0.01, le=10)] = 0.4
     heading_swing_deg: Annotated[float, Field(ge=0, le=45)] = 1.5  # amplitude
     half_length_m: Annotated[float, Field(ge=0.1, le=100)] | None = None  # null: to 2 m beyond the target
+    middle_m: Annotated[float, Field(ge=-1000, le=1000)] | None = None  # along its y; null: the target's middle
 
     @property
     def where(self) -> str:

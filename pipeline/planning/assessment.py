@@ -24,7 +24,7 @@ from pipeline.limits.verdict_limits import largest_sigmas, limits_by_setting, so
 from pipeline.maths.adjustment.solution import ConsiderErrors, Solution, solve, weakest_direction
 from pipeline.maths.mount_parameters import N_MOUNT, PARAMETERS
 from pipeline.mount import mount_of
-from pipeline.planning.observability import VAGUE, Coverage, geometry_advice
+from pipeline.planning.observability import Coverage, geometry_advice, vague_prior
 from pipeline.planning.prediction import PredictedPasses, predict
 from pipeline.planning.setting import PredictionSetting, setting_of
 
@@ -46,7 +46,7 @@ class Accuracy:
         Covariances of the mount (rad, m): from noise alone, and with the consider parameters, in the mean over the
         phases of the boat's unrest. They are NaN if the passes leave a direction open.
     solution : Solution
-        Solution of the average normal equations; if a phase leaves more directions open, of that phase.
+        Solution of the average normal equations.
     """
 
     passes: tuple[Pass, ...]
@@ -114,13 +114,13 @@ class _Adjustment:
 
         Each phase of the boat's unrest is a session that may come. So their covariances are averaged. (That of the
         average normal matrix is smaller: all phases together tell more of a plane than one. At a pier of sheet piling,
-        the sigma of z came out a seventh too small.)
+        the sigma of z came out a seventh too small.) What only some phases leave open is vague there, not open.
         """
         predicted = predict(self.setting, passes, self.turn_s, single_faces=True)
         prior = np.pad(self.prior, (0, len(predicted.with_faces[0]) - len(self.prior)))
-        normals = [normal + prior for normal in (np.mean(predicted.with_faces, axis=0), *predicted.with_faces)]
-        average, *phases = (solve(normal, np.zeros(len(normal)), self.free, prior) for normal in normals)
-        solution = max(average, *phases, key=lambda one: one.deficiency)  # the average one, unless a phase is worse
+        vague, nothing = vague_prior(prior, self.free), np.zeros(len(prior))
+        solution = solve(np.mean(predicted.with_faces, axis=0) + prior, nothing, self.free, prior)
+        phases = [solve(normal + prior + vague, nothing, self.free, prior) for normal in predicted.with_faces]
         random = np.mean([one.noise_covariance()[:N_MOUNT, :N_MOUNT] for one in phases], axis=0)
         total = np.mean([one.total_covariance(self.considered)[:N_MOUNT, :N_MOUNT] for one in phases], axis=0)
         if solution.deficiency:
@@ -193,7 +193,9 @@ def assess_plan(plan: Plan, pool: PoolConfig, session: SessionConfig) -> PlanAss
         speed_m_s=float(speeds),
         heading_swing_deg=float(swings),
     )
-    advice = geometry_advice(setting, coverage, given.predicted.normal + prior, given.solution)
+    size = setting.state.size
+    normals = [normal[:size, :size] + prior for normal in given.predicted.with_faces]
+    advice = geometry_advice(setting, coverage, normals, given.solution)
     better = None
     if plan.candidates and plan.budget is not None:
         better = _best_within_budget(adjustment, plan.candidates, plan.budget.seconds, pool.verdict)
@@ -231,9 +233,7 @@ def _best_within_budget(
     setting, free, turn_s = adjustment.setting, adjustment.free, adjustment.turn_s
     predicted = [predict(setting, [candidate], phases=1) for candidate in candidates]
     bounds = largest_sigmas(limits)
-    vague = np.zeros((setting.state.size, setting.state.size))
-    vague[free, free] = VAGUE**-2
-    vague = vague + adjustment.prior
+    vague = adjustment.prior + vague_prior(adjustment.prior, free)
 
     def cost(normal: Array) -> float:
         covariance = solve(vague + normal, np.zeros(len(normal)), free).covariance[:N_MOUNT, :N_MOUNT]

@@ -19,7 +19,7 @@ WANTED = np.repeat([np.radians(WANTED_DEG), WANTED_M], 3)
 TRIED_M = (3.0, 4.0, 5.0, 6.0, 8.0, 10.0)  # distances of passes that might help
 STRAIGHT_DEG = 5.0  # largest swing of the heading on a straight pass; a boat that turns swings by more
 TWICE = 2  # number of further passes at such a distance
-VAGUE = 1.0  # rad or m: prior sigma of every parameter
+VAGUE = 1.0  # rad or m: prior sigma of every parameter of which nothing is known beforehand
 SIDES = {"P1": "the faces on the -y side (P1)", "P3": "the faces on the +y side (P3)", "P2": "the wall (P2)"}
 ONE_WALL = (
     "both sensors see one wall alone: pitch, yaw and lever arm y rest on the boat's unrest; pass a corner, a recess or "
@@ -64,7 +64,7 @@ class GeometryAdvice:
 
 
 def geometry_advice(
-    setting: PredictionSetting, coverage: Coverage, normal: Array, solution: Solution
+    setting: PredictionSetting, coverage: Coverage, normals: Sequence[Array], solution: Solution
 ) -> GeometryAdvice:
     """Return the gaps in the geometry of the passes, and the further passes that would help.
 
@@ -74,12 +74,12 @@ def geometry_advice(
         Target and instruments.
     coverage : Coverage
         Coverage of the target by the passes.
-    normal : ndarray, shape (u, u)
-        Normal matrix of the passes (rad, m).
+    normals : Sequence[ndarray], each of shape (u, u)
+        Normal matrix of the passes (rad, m), by phase of the boat's unrest; of a session there is one.
     solution : Solution
-        Solution of these normal equations.
+        Solution of these normal equations, of their mean.
     """
-    determined = _Determined(normal, solution)
+    determined = _Determined(normals, solution)
     gaps, sigma = _gaps(coverage), determined.sigmas()
     pair = None if solution.deficiency else correlated_pair(solution.covariance[:N_MOUNT, :N_MOUNT])
     if not (gaps or np.any(sigma > WANTED)):
@@ -91,34 +91,43 @@ def geometry_advice(
 
 @dataclass(frozen=True)
 class _Determined:
-    """Information from the passes: normal matrix (u, u), with prior information, and its solution."""
+    """Information from the passes: normal matrices (u, u) by phase, with prior information, and their mean's solution.
 
-    normal: Array
+    Each has a vague prior, so that sigmas are finite even if a direction is open.
+    """
+
+    normals: Sequence[Array]
     solution: Solution
 
-    def sigmas(self) -> Array:
-        """Return the sigmas of the mount parameters (6,) from noise alone, rad and m: further passes make them smaller.
+    def sigmas(self, further: Array | float = 0.0) -> Array:
+        """Return the sigmas of the mount parameters (6,) from noise alone, rad and m, in the mean over the phases.
 
-        Every parameter has the prior sigma :data:`VAGUE`, so the sigmas are finite even if a direction is open.
+        further: normal matrix (u, u) of further passes, which make them smaller.
         """
-        vague = np.zeros(len(self.normal))
-        vague[self.solution.estimated] = VAGUE**-2
-        return _noise_sigmas(self._solved(np.diag(vague)))
-
-    def with_passes(self, further: Array) -> Solution:
-        """Return the solution with the normal matrix of further passes added."""
-        return self._solved(further)
-
-    def _solved(self, more: Array) -> Solution:
-        estimated, size = self.solution.estimated, len(self.normal)
+        estimated, size = self.solution.estimated, len(self.normals[0])
         prior = np.zeros((size, size))
         prior[np.ix_(estimated, estimated)] = self.solution.prior
-        return solve(self.normal + more, np.zeros(size), estimated.tolist(), prior)
+        vague = vague_prior(prior, estimated.tolist())
+        phases = [
+            solve(normal + vague + further, np.zeros(size), estimated.tolist(), prior) for normal in self.normals
+        ]
+        variances = [np.diag(one.noise_covariance())[:N_MOUNT] for one in phases]
+        return np.asarray(np.sqrt(np.maximum(np.mean(variances, axis=0), 0.0)))
 
 
-def _noise_sigmas(solution: Solution) -> Array:
-    """Return the sigmas (6,) of the mount parameters from noise alone, rad and m."""
-    return np.asarray(np.sqrt(np.maximum(np.diag(solution.noise_covariance()), 0.0))[:N_MOUNT])
+def vague_prior(prior: Array, estimated: Sequence[int]) -> Array:
+    """Return a normal matrix (u, u): the sigma :data:`VAGUE` of the estimated parameters without prior information.
+
+    Parameters
+    ----------
+    prior : ndarray, shape (u, u)
+        Normal matrix of what is known beforehand.
+    estimated : Sequence[int]
+        Numbers of the estimated parameters.
+    """
+    diagonal, numbers = np.zeros(len(prior)), np.asarray(estimated)
+    diagonal[numbers] = np.where(np.diag(prior)[numbers] > 0, 0.0, VAGUE**-2)
+    return np.diag(diagonal)
 
 
 def _gaps(coverage: Coverage) -> list[str]:
@@ -153,10 +162,9 @@ def _remedy(setting: PredictionSetting, coverage: Coverage, determined: _Determi
     best: tuple[float, float, float] | None = None
     for distance in TRIED_M:
         planned = Pass(distance_m=distance, speed_m_s=coverage.speed_m_s, heading_swing_deg=swing_deg)
-        after = determined.with_passes(TWICE * predict(setting, [planned], phases=1).normal)
-        if after.deficiency:
+        sigma = determined.sigmas(TWICE * predict(setting, [planned], phases=1).normal)
+        if np.any(sigma > VAGUE / 2):  # a direction remains open
             continue
-        sigma = _noise_sigmas(after)
         worst = float(np.max(sigma / WANTED))
         if best is None or worst < best[0]:
             best = worst, distance, float(sigma[parameter])

@@ -200,6 +200,7 @@ def _trajectory(setting: PredictionSetting, planned: Pass, seconds: float, numbe
     plan, unrest = setting.plan, setting.plan.unrest
     t = np.arange(0.0, seconds + 1 / plan.ins_rate_hz, 1 / plan.ins_rate_hz)
     half = planned.half_length_m or setting.half_length_m
+    middle = setting.middle_m if planned.middle_m is None else planned.middle_m
 
     def wave(amplitude: float, period_s: float, which: int) -> Array:
         phases = 2 * np.pi * np.modf((number * 5 + which) * PHASE_STEPS)[0]
@@ -209,7 +210,7 @@ def _trajectory(setting: PredictionSetting, planned: Pass, seconds: float, numbe
     period = unrest.period_s
     x = wave(unrest.sway_m, 2 * period, 0) - planned.distance_m
     sense = 1.0 if planned.course == "along" else -1.0
-    y = setting.middle_m + sense * (planned.speed_m_s * t - half)
+    y = middle + sense * (planned.speed_m_s * t - half)
     z = wave(unrest.heave_m, 0.9 * period, 1) + setting.model.water_level_m + plan.ins_height_m
     roll = wave(np.radians(unrest.roll_deg), period, 2)
     pitch = wave(np.radians(unrest.pitch_deg), 0.85 * period, 3)

@@ -69,7 +69,7 @@ def geometry_table(
             usual.heading_swing_deg,
         ),
     )
-    advice = geometry_advice(setting, coverage, normal, solution)
+    advice = geometry_advice(setting, coverage, [normal], solution)
     rows = [("gap", words) for words in advice.gaps]
     if advice.remedy and not rough:
         rows.append(("remedy", advice.remedy))

@@ -90,11 +90,11 @@ def test_a_wrong_clock_or_speed_is_found_when_freed(name: str, options: dict[str
     assert wrong @ np.linalg.solve(held.solution.covariance[:6, :6], wrong) > 100
 
 
-@pytest.mark.parametrize(("true_m", "stated_m", "rtol"), [(0.0, 0.002, 0.02), (0.004, 0.001, 0.08)])
+@pytest.mark.parametrize(("true_m", "stated_m", "rtol"), [(0.0, 0.002, 0.02), (0.004, 0.001, 0.03)])
 def test_a_wrong_figure_of_the_white_noise_changes_nothing(true_m: float, stated_m: float, rtol: float) -> None:
     """The laser's points show how large it is; weights, design and covariance follow them. (The drift is free.)
 
-    rtol: one sigma of what they tell, to 15 % of the variance of 4 mm.
+    Of the variance of 4 mm they tell 7 % too much here; one sigma is 15 %.
     """
     true, stated = (NOISY.model_copy(update={"white": White(position_m=m, attitude_deg=0)}) for m in (true_m, stated_m))
     streams, model = made(1, true)

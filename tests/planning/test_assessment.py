@@ -24,7 +24,6 @@ from pipeline.planning.prediction import predict
 from pipeline.planning.setting import setting_of
 from pipeline.simulation.beams import directions_in_mbes, swing_rad
 from stages.commands.plan import table
-from tests.support.docks import DOCK
 from tests.support.effort import often
 from tests.support.places import poolcal
 from tests.support.simulated import THIN, calibrated, made
@@ -62,35 +61,6 @@ def test_sigmas_are_those_of_the_adjustment_on_a_session_of_the_same_plan(drift:
         ratio = [found[key][name] / result[key][name] for name in SETTINGS]
         assert max(abs(np.log(ratio))) < np.log(1.15), (key, dict(zip(SETTINGS, ratio, strict=True)))
     assert (answer.gaps, answer.remedy, answer.better) == ([], "", None)
-
-
-def test_the_covariance_is_the_mean_over_the_phases_of_the_unrest(configs: tuple[PoolConfig, SessionConfig]) -> None:
-    """Each phase is a session that may come. The average normal matrix is none of them."""
-    given = assessment.assess_plan(plan_of(4.0, 8.0), *configs).given
-    free, known = np.ix_(given.solution.estimated, given.solution.estimated), given.solution.prior
-
-    def of_noise(normal: np.ndarray) -> np.ndarray:
-        C = np.linalg.inv(normal[free] + known)
-        return np.asarray((C - C @ known @ C)[:6, :6])
-
-    phases = [of_noise(normal) for normal in given.predicted.with_faces]
-    np.testing.assert_allclose(given.random, np.mean(phases, axis=0), rtol=1e-6, atol=1e-12)
-    of_average = of_noise(np.mean(given.predicted.with_faces, axis=0))
-    assert np.abs(np.diag(of_average) / np.diag(given.random) - 1).max() > 0.005
-
-
-def test_passes_go_by_the_targets_middle_wherever_its_origin_stands() -> None:
-    """The origin of a found target lies on its largest wall, which may be the last one."""
-    session = made(copy.deepcopy(DOCK), {"track": {"distances_m": [4.0]}}, seed=2)
-    totals = []
-    for moved_m in (0.0, 7.0):
-        pool = copy.deepcopy(session.pool)
-        for face in pool["target"]["faces"].values():
-            face["corners"] = [[x, y + moved_m, z] for x, y, z in face["corners"]]
-        read = parse(PoolConfig, pool, "pool"), parse(SessionConfig, session.session, "session")
-        totals.append(assessment.assess_plan(plan_of(4.0, 7.0), *read).given)
-    assert totals[1].seconds == pytest.approx(totals[0].seconds)
-    np.testing.assert_allclose(totals[1].total, totals[0].total, rtol=1e-3, atol=1e-12)
 
 
 def test_the_beams_of_a_plan_are_those_of_its_sectors(configs: tuple[PoolConfig, SessionConfig]) -> None:

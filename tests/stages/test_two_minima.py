@@ -18,7 +18,7 @@ from tools.session_rows import errors_of
 SEED = 75_022  # by the mount alone, brought onto walls that are off by centimetres, the yaw starts 3° off
 BUILT = AsBuilt(offset_sigma_m=0.02, angle_sigma_deg=0.1)
 PANS, MARGIN_M = (2, 6, 10, 14), 0.1  # those behind, without their edges, as they are found
-THIN = {"laser": {"point_rate_hz": 4000.0}}
+THIN = {"laser": {"point_rate_hz": 4000.0, "line_rate_hz": 20.0}, "mbes": {"ping_rate_hz": 10.0}}
 
 
 def test_the_yaw_ends_on_the_right_side_of_the_walls_normal() -> None:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pipeline.maths.adjustment.design_matrix import pose_design
 from pipeline.maths.adjustment.interval_sums import N_MOVED, Intervals, IntervalSums, blocks
 from pipeline.maths.adjustment.observed_surface import ObservedSurface
+from pipeline.maths.adjustment.robust_weights import NOT_REDUCED, RobustMeans
 from pipeline.maths.adjustment.weighting import FEWEST, EpochVarianceFactor
 
 Array = NDArray[np.float64]
@@ -108,26 +109,27 @@ class Lines:
             sloping=(sums.count >= FEWEST) & (values[:, 1] > LEAST_SPREAD),
         )
 
-    def mean_differences(self) -> Differences:
+    def mean_differences(self, robust: RobustMeans = NOT_REDUCED) -> Differences:
         """Return the differences of the means of successive intervals."""
         first, second = self._pairs(np.ones(len(self.record), dtype=bool))
         squared = (self.mean[second] - self.mean[first]) ** 2
-        return self._differences(squared, first, second, self.total, self.of_mean)
+        return self._differences(squared, first, second, self.total, self.of_mean, robust)
 
-    def slope_differences(self) -> Differences:
+    def slope_differences(self, robust: RobustMeans = NOT_REDUCED) -> Differences:
         """Return the differences of the slopes of successive intervals."""
         first, second = self._pairs(self.sloping)
         alike = np.einsum("ni,ni->n", self.along[first], self.along[second])
         near = np.abs(alike) > ALIKE
         first, second, sense = first[near], second[near], np.sign(alike[near])
         squared = (sense * self.slope[second] - self.slope[first]) ** 2
-        return self._differences(squared, first, second, self.spread, self.of_slope)
+        return self._differences(squared, first, second, self.spread, self.of_slope, robust)
 
     def _differences(
-        self, squared: Array, first: Integers, second: Integers, weight: Array, common: Array
+        self, squared: Array, first: Integers, second: Integers, weight: Array, common: Array, robust: RobustMeans
     ) -> Differences:
-        own = 1 / weight[first] + 1 / weight[second]
-        return Differences(squared / own, (common[first] + common[second]) / own, self.surface[first])
+        own = robust.variance * (1 / weight[first] + 1 / weight[second])
+        shown = robust.shift**2 * (common[first] + common[second])
+        return Differences(squared / own, shown / own, self.surface[first])
 
     def _pairs(self, enough: NDArray[np.bool_]) -> tuple[Integers, Integers]:
         """Return the intervals in the mask (g,) that have a successor, and this successor: their rows (n,) each."""

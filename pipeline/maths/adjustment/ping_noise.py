@@ -21,7 +21,8 @@ U' being the part of U for (α, β). They are estimated from the *differences* o
 Neumann 1941, "Distribution of the ratio of the mean square successive difference"). A mean itself contains what is
 wrong for longer: a face that is not where it should be, a drift. That is no noise, and must not make the tests of it
 blind. The first later interval that shares no INS record with an interval is its successor, so the variances add. With
-y² the squared difference over the sum of 1 / Σ w, its mean is d + (f + x) g. d and d' (by surface) and f + x (by the
+y² the squared difference over the sum of 1 / Σ w, its mean is d + (f + x) g. (Robust weights take a part of both:
+:func:`~pipeline.maths.adjustment.robust_weights.robust_means`.) d and d' (by surface) and f + x (by the
 sensor) follow by regression, in turn, with the weights of maximum likelihood, (d + (f + x) g)⁻². Differences that
 overlap are correlated, so variances of these estimates are 3/2 of those of as many independent ones.
 
@@ -51,6 +52,7 @@ from pipeline.maths.adjustment.ping_differences import (
     outer,
     white_covariance,
 )
+from pipeline.maths.adjustment.robust_weights import NOT_REDUCED, RobustMeans
 from pipeline.maths.adjustment.weighting import FLAT, EpochVarianceFactor
 
 Array = NDArray[np.float64]
@@ -77,7 +79,11 @@ class PingNoise:
 
 
 def ping_noise(
-    sums: Intervals, surfaces: Sequence[ObservedSurface], white: Array, laser: EpochVarianceFactor
+    sums: Intervals,
+    surfaces: Sequence[ObservedSurface],
+    white: Array,
+    laser: EpochVarianceFactor,
+    robust: RobustMeans = NOT_REDUCED,
 ) -> PingNoise:
     """Return the noise that the soundings of a ping share.
 
@@ -91,9 +97,11 @@ def ping_noise(
         Standard deviations of a record's white noise, m and rad.
     laser : EpochVarianceFactor
         Variance factor f of this noise, from the laser's points.
+    robust : RobustMeans, optional
+        What robust weights do to means and slopes.
     """
     count, lines = len(surfaces), Lines.of(sums, surfaces, white)
-    means, slopes = lines.mean_differences(), lines.slope_differences()
+    means, slopes = lines.mean_differences(robust), lines.slope_differences(robust)
     effects, epoch = DesignEffects(np.ones(count), np.ones(count)), laser
     for _ in range(ROUNDS):
         epoch = means.epoch_factor(effects.of_mean, epoch.factor)

@@ -12,13 +12,14 @@ with own = 1 / Σ w, and otherwise c = ((1 - s_i)² + s_i²) |g_i|² + ((1 - s_j
 and 200 s, and 2 mm of white noise are looked for. So f does not grow if the INS drifts faster than its figures say. The
 residuals are those without the estimated drift, which has taken a part of the noise: with knots 0.12 s apart their mean
 square is 7 % too small, but that of these differences, and f, only 1 %. (With the drift left in them, f would count all
-that an INS of 10 records a second drifts in half a second.) Robust weights follow v, which contains the common error: a
-mean tells the part κ of it (:func:`~pipeline.maths.adjustment.robust_weights.mean_kept`), and κ² c takes the place of
-c. (That is κ of an error much smaller than the points' own noise; of a larger one more is told, and f comes out up to
-1.4 % too large.) f follows by regression with the weights of maximum likelihood, c / (own_i + own_j + f c)², over all
-such pairs. Pairs are not independent. Neighbours in a sequence of differences have a correlation of -1/2, and the
-squares of these add half to the variance of f. The stated sigma is that of the pairs of neighbours alone: the others,
-which repeat their information in part, take up to a third off it.
+that an INS of 10 records a second drifts in half a second.) Robust weights follow v, which contains the common error,
+and take a part of both: κ² c and ν own stand for c and own
+(:func:`~pipeline.maths.adjustment.robust_weights.robust_means`). That is exact for a common error much smaller than the
+points' own noise; of a larger one a mean shows more than κ, and f comes out up to 1.4 % too large. f follows by
+regression with the weights of maximum likelihood, c / (own_i + own_j + f c)², over all such pairs. Pairs are not
+independent. Neighbours in a sequence of differences have a correlation of -1/2, and the squares of these add half to
+the variance of f. The stated sigma is that of the pairs of neighbours alone: the others, which repeat their information
+in part, take up to a third off it.
 """
 
 import numpy as np
@@ -26,6 +27,7 @@ from numpy.typing import NDArray
 
 from pipeline.maths.adjustment.interval_sums import BLOCK, N_MOVED, Intervals, blocks
 from pipeline.maths.adjustment.pose_errors import N_POSE
+from pipeline.maths.adjustment.robust_weights import NOT_REDUCED, RobustMeans
 from pipeline.maths.adjustment.weighting import EpochVarianceFactor
 
 Array = NDArray[np.float64]
@@ -35,7 +37,7 @@ ROUNDS = 3  # of the regression, first with f = 1
 
 
 def record_noise_factor(
-    sums: Intervals, pose_designs: Array, white: Array, mean_kept: float = 1.0
+    sums: Intervals, pose_designs: Array, white: Array, robust: RobustMeans = NOT_REDUCED
 ) -> EpochVarianceFactor:
     """Return the variance factor of the records' white noise, and its sigma (infinite: unknown).
 
@@ -47,15 +49,16 @@ def record_noise_factor(
         Design K of pose errors by surface.
     white : (6,) array
         Standard deviations of a record's white noise, m and rad.
-    mean_kept : float
-        Part κ of an error common to an interval that its mean tells; 1: all, no weight was reduced.
+    robust : RobustMeans, optional
+        What robust weights do to the intervals' means.
     """
     g, (mean, own, share) = np.empty((len(sums), N_POSE)), np.empty((3, len(sums)))
     for start, block in zip(range(0, len(sums), BLOCK), blocks(sums), strict=True):
         rows, information = slice(start, start + BLOCK), block.normal[:, 0, 0]
         of_moved = block.normal[:, 0, :N_MOVED] / information[:, None]
-        g[rows] = np.einsum("gi,gij->gj", of_moved, pose_designs[block.surface]) * white * mean_kept
-        mean[rows], own[rows], share[rows] = block.right[:, 0] / information, 1 / information, block.share
+        g[rows] = np.einsum("gi,gij->gj", of_moved, pose_designs[block.surface]) * white * robust.shift
+        mean[rows], own[rows] = block.right[:, 0] / information, robust.variance / information
+        share[rows] = block.share
     share = share[:, None]
     before, after = (1 - share) * g, share * g  # of the record before the interval, and of that after it
     order = np.lexsort((sums.record, sums.surface))

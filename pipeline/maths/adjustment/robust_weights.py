@@ -1,5 +1,7 @@
 """Robust weights by the function IGG III, what they leave of the variance of good observations, and robust scales."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -58,23 +60,45 @@ def variance_kept(k0: float, k1: float) -> float:
     return float((2 * (ndtr(k0) - 0.5 - k0 * low) + reduced) / (2 * ndtr(k1) - 1))
 
 
-def mean_kept(k0: float, k1: float) -> float:
-    """Return E[w z²] / E[w], the part of a small shift e of all observations that a mean with weights of IGG III tells.
+@dataclass(frozen=True)
+class RobustMeans:
+    """What robust weights do to means Σ w v / Σ w, compared with weights that are not reduced (1 and 1).
 
-    The weights follow the shifted observations z + e, z standard normal. With ψ(z) = z w(z), a mean of many of them is
+    shift: the mean shows this part κ of a small error that all its observations share; variance: that of its
+    observations' own noise is this part ν of 1 / Σ w.
+    """
 
-        Σ w (z + e) / Σ w → E ψ(z + e) / E w(z + e) = e E ψ'(z) / E w(z) + O(e³),
+    shift: float = 1.0
+    variance: float = 1.0
 
-    and E ψ'(z) = E z ψ(z) = E[w z²] (by parts, φ' = -z φ). Both integrals are sums over fine steps.
+
+NOT_REDUCED = RobustMeans()
+
+
+def robust_means(k0: float, k1: float) -> RobustMeans:
+    """Return what the weights of IGG III do to means of normal observations.
+
+    The weights follow the observations z + e, z standard normal, with their common error e. With ψ(z) = z w(z), the
+    mean of n of them is
+
+        Σ w (z + e) / Σ w → E ψ(z + e) / E w(z + e) = e E ψ'(z) / E w(z) + O(e³),    E ψ'(z) = E z ψ(z) = E[w z²]
+
+    (by parts, φ' = -z φ), and the variance of its noise is n E ψ² / (n E w)² = E[w² z²] / (E w Σ w). So
+
+        κ = E[w z²] / E w,      ν = E[w² z²] / E w,
+
+    integrals that are sums over fine steps here.
 
     Examples
     --------
-    >>> round(mean_kept(3.0, 6.0), 4), round(mean_kept(30.0, 60.0), 4)
-    (0.993, 1.0)
+    >>> of = robust_means(3.0, 6.0)
+    >>> round(of.shift, 4), round(of.variance, 4)
+    (0.993, 0.9885)
     """
     z = np.linspace(0.0, min(k1, NORMAL_END), NODES)
-    weighted = igg3_weights(z, k0, k1) * np.exp(-z * z / 2)
-    return float(np.trapezoid(weighted * z * z) / np.trapezoid(weighted))
+    w = igg3_weights(z, k0, k1)
+    of_w, of_shift, of_square = (float(np.trapezoid(part * np.exp(-z * z / 2))) for part in (w, w * z**2, (w * z) ** 2))
+    return RobustMeans(of_shift / of_w, of_square / of_w)
 
 
 def histogram(normalised: Array) -> Array:

@@ -36,7 +36,7 @@ from numpy.typing import NDArray
 
 from pipeline.maths.adjustment.interval_sums import N_MOVED, Intervals, IntervalSums, blocks
 from pipeline.maths.adjustment.pose_errors import N_POSE, PoseNoise
-from pipeline.maths.adjustment.robust_weights import igg3_weights, mean_kept, variance_kept
+from pipeline.maths.adjustment.robust_weights import NOT_REDUCED, RobustMeans, igg3_weights, robust_means, variance_kept
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -237,9 +237,9 @@ class Weighting:
         return 1.0 if self.robust is None else variance_kept(*self.robust)
 
     @property
-    def mean_kept(self) -> float:
-        """The part of an error common to an interval that its mean tells, with the robust weights."""
-        return 1.0 if self.robust is None else mean_kept(*self.robust)
+    def of_means(self) -> RobustMeans:
+        """What the robust weights do to the means of intervals."""
+        return NOT_REDUCED if self.robust is None else robust_means(*self.robust)
 
     def weights(self, residuals: Residuals) -> tuple[Array, Array]:
         """Return the robust weights w (n,) and the full weights w e / (κ f σ²) (n,), e being the weight near edges."""

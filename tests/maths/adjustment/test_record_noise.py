@@ -5,14 +5,20 @@ import pytest
 
 from pipeline.maths.adjustment.interval_sums import IntervalSums, LinearisedPoints, interval_sums
 from pipeline.maths.adjustment.record_noise import record_noise_factor
+from pipeline.maths.adjustment.robust_weights import NOT_REDUCED, igg3_weights, robust_means
 
 EACH = 12
 WHITE = np.array([2.0, 1.0, 1.0, 0.0, 0.0, 0.5])
 POSES = np.random.default_rng(5).normal(size=(2, 3, 6))
 
 
-def intervals(record: np.ndarray, factor: float, drift: float) -> IntervalSums:
-    """Points of two surfaces, with the noise of the records beside them, a random walk, and noise of their own."""
+def intervals(
+    record: np.ndarray, factor: float, drift: float, bounds: tuple[float, float] = (1e3, 2e3)
+) -> IntervalSums:
+    """Points of two surfaces, with the noise of the records beside them, a random walk, and noise of their own.
+
+    ``bounds``: of robust weights.
+    """
     rng = np.random.default_rng(9)
     last = int(record.max()) + 2
     noise = np.sqrt(factor) * WHITE * rng.normal(size=(last, 6))
@@ -28,7 +34,8 @@ def intervals(record: np.ndarray, factor: float, drift: float) -> IntervalSums:
         pieces.append((at, np.full(n, surface), share, q, v))
     at, surface, share, q, v = (np.concatenate([piece[k] for piece in pieces], axis=-1) for k in range(5))
     order = np.lexsort((surface, at))
-    points = LinearisedPoints(at[order], surface[order], share[order], q[:, order], np.full(len(at), 1 / 9), v[order])
+    weight = igg3_weights(v[order] / 3.0, *bounds) / 9.0
+    points = LinearisedPoints(at[order], surface[order], share[order], q[:, order], weight, v[order])
     return interval_sums(points)
 
 
@@ -43,10 +50,13 @@ def test_the_noise_is_found_beside_a_drift_of_many_times_its_size(factor: float,
 
 
 def test_what_robust_weights_take_off_the_means_is_given_back() -> None:
-    sums = intervals(np.arange(300), 1.0, drift=0.1)
-    whole, reduced = (record_noise_factor(sums, POSES, WHITE, kept) for kept in (1.0, 0.5))
-    assert reduced.factor == pytest.approx(4 * whole.factor, rel=0.01)
-    assert reduced.sigma == pytest.approx(4 * whole.sigma, rel=0.01)
+    """Of the means' own noise they take more than of a common error: together a third of the factor, or more."""
+    bounds = 1.5, 3.0
+    sums = intervals(np.arange(3000), 0.1, drift=0.0, bounds=bounds)
+    given = NOT_REDUCED, robust_means(*bounds)
+    whole, reduced = (record_noise_factor(sums, POSES, WHITE, robust) for robust in given)
+    assert abs(reduced.factor - 0.1) < 2 * reduced.sigma
+    assert whole.factor < 0.1 - 4 * reduced.sigma
 
 
 def test_without_pairs_or_noise_nothing_is_known() -> None:

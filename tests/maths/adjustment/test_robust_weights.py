@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import norm
 
-from pipeline.maths.adjustment.robust_weights import igg3_weights, mean_kept, variance_kept
+from pipeline.maths.adjustment.robust_weights import igg3_weights, robust_means, variance_kept
 from pipeline.maths.adjustment.weighting import PRIOR_DOF, shrunk_factors
 
 
@@ -19,12 +19,15 @@ def test_the_variance_that_the_weights_leave_is_the_integral(k0: float, k1: floa
 
 
 @pytest.mark.parametrize(("k0", "k1"), [(1.5, 3.0), (3.0, 6.0), (2.0, 1000.0)])
-def test_a_weighted_mean_tells_the_stated_part_of_a_small_shift(k0: float, k1: float) -> None:
-    shift, z = 0.05, np.random.default_rng(5).normal(size=1_000_000)
-    z = np.concatenate([z, -z]) + shift  # without the noise of the mean
+def test_of_a_common_error_and_of_their_noise_means_show_what_is_stated(k0: float, k1: float) -> None:
+    shift, z = 0.05, np.random.default_rng(5).normal(size=(100_000, 20))
+    of = robust_means(k0, k1)
+    both = np.concatenate([z, -z]) + shift  # without the noise of the mean
+    w = igg3_weights(both, k0, k1)
+    assert np.sum(w * both) / w.sum() / shift == pytest.approx(of.shift, abs=0.002)  # 1 would fail
     w = igg3_weights(z, k0, k1)
-    assert w @ z / w.sum() / shift == pytest.approx(mean_kept(k0, k1), abs=0.002)
-    assert mean_kept(k0, k1) < 0.999  # which the shift itself would not pass for
+    means, stated = np.sum(w * z, axis=1) / w.sum(axis=1), np.mean(1 / w.sum(axis=1))
+    assert np.mean(means**2) / stated == pytest.approx(of.variance, abs=0.012)
 
 
 LEVEL = np.array([False, False, False, True, True])
