@@ -22,8 +22,9 @@ EXPLAINED = """
 The normalised squared error (NSE) by the total covariance is 6 in the mean if the sigmas are true. A session of which a
 test or a search says that something is wrong is rejected, and its NSE stands in the last column but one, not in the
 first. "Plan" is the total sigma that `poolcal plan` predicts for the passes as they were sailed (distance from the
-found wall, speed, length) and the same unrest, at the faces that the session found, with the mount that it gave (walls
-that look one way show yaw by its sine); of the ratios of the first {planned} sessions this is the median.
+found wall, place along it, length, speed) and the same unrest, at the faces that the session found, with the mount that
+it gave (walls that look one way show yaw by its sine); of the ratios of the first {planned} sessions this is the
+median.
 """
 
 

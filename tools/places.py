@@ -14,7 +14,7 @@ from pipeline.maths.geometry.geodesy import PoolFrame
 Corners = list[list[float]]
 FOOT_M, TOP_M = -4.0, 2.0
 TRACK: dict[str, Any] = {"distances_m": [4.0, 7.0, 5.0, 6.0], "half_length_m": 6.0}
-RATES: dict[str, Any] = {  # without a common phase: pings and lines fall anywhere between the INS's records
+RATES: dict[str, Any] = {  # 19.3 and 9.7 do not divide 100: lines and pings fall anywhere between records
     "ins": {"rate_hz": 100.0},
     "laser": {"point_rate_hz": 8000.0, "line_rate_hz": 19.3},
     "mbes": {"ping_rate_hz": 9.7},

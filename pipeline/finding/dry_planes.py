@@ -140,9 +140,9 @@ def _near_the_edge(on_m: Array, away_m: Array, normal: Array, coarse: Array) -> 
 
     Means of the outermost cells lie up to half a cell inside the edge, and voxels at a corner belong to neither wall:
     together a fifth of a narrow wall's points. So the outline is that of the outermost cells' points themselves. Points
-    of the next wall lie near the plane, too, up to as far beyond the edge as they may be off the plane: on a smooth
-    wall that is as far as its own points are. (Up to 3 cm, the pans of sheet piling came out 4 to 6 cm too wide, and
-    the scatter of their edges passed for noise of the INS.)
+    of the next wall lie near the plane, too, as far beyond the edge as they may be off the plane. So they may be off by
+    three sigmas of the wall's own points: an end that stands off by more is left out. (By 3 cm, the pans of sheet
+    piling came out 4 to 6 cm too wide, and the scatter of their edges passed for noise of the INS.)
     """
     in_plane = on_m @ plane_axes(normal).T
     within = inside(coarse, in_plane)
