@@ -25,7 +25,7 @@ VOXEL_M = 0.3
 CUT, SMOOTH_M = 3.0, 0.001  # of robust sigmas of the cells, and the least of these
 FEWEST_CELLS, REFITS = 8, 5  # cells of a plane, fits of a plane to its cells
 GROWTH = GrowthLimits(thickness_m=0.03, distance_m=0.06, least_voxels=12)
-SAMPLE = 4000  # points of a plane that are kept for pictures, up to twice as many
+SAMPLE = 4000  # points of a plane that are kept for pictures, and tell its scatter; up to twice as many
 MARGIN_M = 0.1  # of the outline: inside the outermost cells' means
 EDGE_CELL_M, EDGE_MARGIN_M = 0.1, 0.02  # the same of the last outline, where the points are dense enough
 BEYOND_M = VOXEL_M + MARGIN_M  # so far outside the first outline the last one may lie
@@ -144,11 +144,11 @@ def _near_the_edge(on_m: Array, away_m: Array, normal: Array, coarse: Array) -> 
     three sigmas of the wall's own points: an end that stands off by more is left out. (By 3 cm, the pans of sheet
     piling came out 4 to 6 cm too wide, and the scatter of their edges passed for noise of the INS.)
     """
-    in_plane = on_m @ plane_axes(normal).T
-    within = inside(coarse, in_plane)
+    in_plane, some = on_m @ plane_axes(normal).T, slice(None, None, max(1, len(on_m) // SAMPLE))
+    within = inside(coarse, in_plane[some])
     if len(coarse) < 3 or not within.any():
         return coarse
-    in_plane = in_plane[away_m <= CUT * max(NORMAL * float(np.median(away_m[within])), SMOOTH_M)]
+    in_plane = in_plane[away_m <= CUT * max(NORMAL * float(np.median(away_m[some][within])), SMOOTH_M)]
     low, high = coarse.min(axis=0), coarse.max(axis=0)
     in_plane = in_plane[np.all((in_plane > low - BEYOND_M) & (in_plane < high + BEYOND_M), axis=1)]
     cells, inverse, count = cells_of(in_plane, EDGE_CELL_M)
