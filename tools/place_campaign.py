@@ -115,7 +115,8 @@ def _predicted(
     settings = parse(Scenario, scenario, "place")
     motion, sailed = settings.motion, pd.read_parquet(run / "ingest" / "passes.parquet")
     here, drawn = frame_of(found["target"]), frame_of(scenario["target"])
-    middle_m = float(here.points_from_ecef(drawn.points_to_ecef(np.zeros((1, 3))))[0, 1])
+    middle = [[-float(np.mean(settings.track.distances_m)), 0.0, 0.0]]  # of the passes
+    middle_m = float(here.points_from_ecef(drawn.points_to_ecef(np.array(middle)))[0, 1])
     content = {
         "ins_rate_hz": settings.ins.rate_hz,
         "unrest": {
@@ -140,11 +141,12 @@ def _predicted(
         ],
     }
     plan.write_text(yaml.safe_dump(content), encoding="utf-8")
-    status, _ = poolcal(["plan", plan, "--session", place, "--config", pool, "--yaml", out], (0, 1, 2))
+    status, said = poolcal(["plan", plan, "--session", place, "--config", pool, "--yaml", out], (0, 1, 2))
     given = yaml.safe_load(out.read_text("utf-8"))["given"] if status < 2 else {}  # 2: no plan with a mount so wrong
+    refusal = said.strip() if status == 2 else ""
     sigmas = given.get("sigma_mount_total") or {}
     keys = {"pitch": "pitch_deg", "roll": "roll_deg", "yaw": "yaw_deg", "x": "x_m", "y": "y_m", "z": "z_m"}
-    return {"allowed": status == 0} | {
+    return {"allowed": status == 0, "plan_refused": refusal} | {
         f"planned_{name}": sigmas.get(key, np.nan) * (1000.0 if key.endswith("_m") else 1.0)
         for name, key in keys.items()
     }

@@ -106,8 +106,8 @@ def _plane(all_m: Array, rows: Integers, grown: Plane | DryPlane, boat_m: Array)
     _, outline = cells_on(in_it_m, normal, distance_m, CELL_M, MARGIN_M)
     away = np.abs(all_m @ normal - distance_m)
     near = (away <= UNEVEN_M) & (all_m[:, 2] > waves_m)
-    on_m = all_m[near]
-    outline = _near_the_edge(on_m, away[near], normal, outline)
+    on_m, away = all_m[near], away[near]
+    outline = _near_the_edge(on_m, away, normal, outline)
     away = points_m @ normal - distance_m
     on = np.abs(away) <= OFF_M
     in_plane, heights, away = points_m[on] @ plane_axes(normal).T, points_m[on, 2], away[on]
@@ -144,7 +144,7 @@ def _near_the_edge(on_m: Array, away_m: Array, normal: Array, coarse: Array) -> 
     three sigmas of the wall's own points: an end that stands off by more is left out. (By 3 cm, the pans of sheet
     piling came out 4 to 6 cm too wide, and the scatter of their edges passed for noise of the INS.)
     """
-    in_plane, some = on_m @ plane_axes(normal).T, slice(None, None, max(1, len(on_m) // SAMPLE))
+    in_plane, some = on_m @ plane_axes(normal).T, slice(None, None, len(on_m) // SAMPLE | 1)
     within = inside(coarse, in_plane[some])
     if len(coarse) < 3 or not within.any():
         return coarse

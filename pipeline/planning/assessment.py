@@ -24,7 +24,7 @@ from pipeline.limits.verdict_limits import largest_sigmas, limits_by_setting, so
 from pipeline.maths.adjustment.solution import ConsiderErrors, Solution, solve, weakest_direction
 from pipeline.maths.mount_parameters import N_MOUNT, PARAMETERS
 from pipeline.mount import mount_of
-from pipeline.planning.observability import Coverage, geometry_advice, vague_prior
+from pipeline.planning.observability import VAGUE, Coverage, geometry_advice
 from pipeline.planning.prediction import PredictedPasses, predict
 from pipeline.planning.setting import PredictionSetting, setting_of
 
@@ -46,7 +46,7 @@ class Accuracy:
         Covariances of the mount (rad, m): from noise alone, and with the consider parameters, in the mean over the
         phases of the boat's unrest. They are NaN if the passes leave a direction open.
     solution : Solution
-        Solution of the average normal equations.
+        Solution of the average normal equations; if a phase leaves more directions open, of that phase.
     """
 
     passes: tuple[Pass, ...]
@@ -100,7 +100,8 @@ class _Adjustment:
     """Inputs of an adjustment of predicted passes, apart from the passes.
 
     ``turn_s``: time of a turn; ``considered``: errors of the fixed parameters; ``free``: numbers of the estimated
-    parameters; ``prior`` (u, u): normal matrix of what is known of them beforehand.
+    parameters; ``prior`` (u, u): normal matrix of what is known of them beforehand; ``vague`` (u,): weak information on
+    the surfaces, for phases of the boat's unrest in which one is not seen.
     """
 
     setting: PredictionSetting
@@ -108,19 +109,24 @@ class _Adjustment:
     considered: ConsiderErrors
     free: list[int]
     prior: Array
+    vague: Array
 
     def accuracy(self, passes: Sequence[Pass]) -> Accuracy:
         """Return the predicted accuracy of a calibration from these passes.
 
         Each phase of the boat's unrest is a session that may come. So their covariances are averaged. (That of the
         average normal matrix is smaller: all phases together tell more of a plane than one. At a pier of sheet piling,
-        the sigma of z came out a seventh too small.) What only some phases leave open is vague there, not open.
+        the sigma of z came out a seventh too small.) A phase that tells nothing of a plane leaves it vague; one that
+        leaves the mount open leaves the plan without a result.
         """
         predicted = predict(self.setting, passes, self.turn_s, single_faces=True)
         prior = np.pad(self.prior, (0, len(predicted.with_faces[0]) - len(self.prior)))
-        vague, nothing = vague_prior(prior, self.free), np.zeros(len(prior))
-        solution = solve(np.mean(predicted.with_faces, axis=0) + prior, nothing, self.free, prior)
-        phases = [solve(normal + prior + vague, nothing, self.free, prior) for normal in predicted.with_faces]
+        vague = np.diag(np.pad(self.vague, (0, len(prior) - len(self.vague))))
+        average, *phases = (
+            solve(normal + prior, np.zeros(len(prior)), self.free, prior)
+            for normal in (np.mean(predicted.with_faces, axis=0), *(one + vague for one in predicted.with_faces))
+        )
+        solution = max(average, *phases, key=lambda one: one.deficiency)  # the average's, unless a phase tells less
         random = np.mean([one.noise_covariance()[:N_MOUNT, :N_MOUNT] for one in phases], axis=0)
         total = np.mean([one.total_covariance(self.considered)[:N_MOUNT, :N_MOUNT] for one in phases], axis=0)
         if solution.deficiency:
@@ -178,7 +184,9 @@ def assess_plan(plan: Plan, pool: PoolConfig, session: SessionConfig) -> PlanAss
     known = known_parameters(setting.state, considered, pool.adjust.free)
     if known is not None:
         free, prior = sorted({*free, *known.numbers.tolist()}), known.pseudo_observations(setting.state).normal
-    adjustment = _Adjustment(setting, turn_s, considered, free, prior)
+    vague = np.zeros(setting.state.size)
+    vague[setting.state.surface_slice] = VAGUE**-2
+    adjustment = _Adjustment(setting, turn_s, considered, free, prior, vague)
     given = adjustment.accuracy(plan.passes)
     speeds, swings = (np.median([getattr(p, name) for p in plan.passes]) for name in ("speed_m_s", "heading_swing_deg"))
     coverage = Coverage(
@@ -194,7 +202,7 @@ def assess_plan(plan: Plan, pool: PoolConfig, session: SessionConfig) -> PlanAss
         heading_swing_deg=float(swings),
     )
     size = setting.state.size
-    normals = [normal[:size, :size] + prior for normal in given.predicted.with_faces]
+    normals = [normal[:size, :size] + prior + np.diag(vague) for normal in given.predicted.with_faces]
     advice = geometry_advice(setting, coverage, normals, given.solution)
     better = None
     if plan.candidates and plan.budget is not None:
@@ -233,7 +241,9 @@ def _best_within_budget(
     setting, free, turn_s = adjustment.setting, adjustment.free, adjustment.turn_s
     predicted = [predict(setting, [candidate], phases=1) for candidate in candidates]
     bounds = largest_sigmas(limits)
-    vague = adjustment.prior + vague_prior(adjustment.prior, free)
+    vague = np.zeros((setting.state.size, setting.state.size))
+    vague[free, free] = VAGUE**-2
+    vague = vague + adjustment.prior
 
     def cost(normal: Array) -> float:
         covariance = solve(vague + normal, np.zeros(len(normal)), free).covariance[:N_MOUNT, :N_MOUNT]

@@ -19,7 +19,7 @@ WANTED = np.repeat([np.radians(WANTED_DEG), WANTED_M], 3)
 TRIED_M = (3.0, 4.0, 5.0, 6.0, 8.0, 10.0)  # distances of passes that might help
 STRAIGHT_DEG = 5.0  # largest swing of the heading on a straight pass; a boat that turns swings by more
 TWICE = 2  # number of further passes at such a distance
-VAGUE = 1.0  # rad or m: prior sigma of every parameter of which nothing is known beforehand
+VAGUE = 1.0  # rad or m: prior sigma of every parameter
 SIDES = {"P1": "the faces on the -y side (P1)", "P3": "the faces on the +y side (P3)", "P2": "the wall (P2)"}
 ONE_WALL = (
     "both sensors see one wall alone: pitch, yaw and lever arm y rest on the boat's unrest; pass a corner, a recess or "
@@ -91,43 +91,36 @@ def geometry_advice(
 
 @dataclass(frozen=True)
 class _Determined:
-    """Information from the passes: normal matrices (u, u) by phase, with prior information, and their mean's solution.
-
-    Each has a vague prior, so that sigmas are finite even if a direction is open.
-    """
+    """Information from the passes: normal matrices (u, u) by phase, with prior information; their mean's solution."""
 
     normals: Sequence[Array]
     solution: Solution
 
-    def sigmas(self, further: Array | float = 0.0) -> Array:
+    def sigmas(self) -> Array:
         """Return the sigmas of the mount parameters (6,) from noise alone, rad and m, in the mean over the phases.
 
-        further: normal matrix (u, u) of further passes, which make them smaller.
+        Every parameter has the prior sigma :data:`VAGUE`, so the sigmas are finite even if a direction is open.
         """
+        vague = np.zeros(len(self.normals[0]))
+        vague[self.solution.estimated] = VAGUE**-2
+        return _noise_sigmas(self._solved(np.diag(vague)))
+
+    def with_passes(self, further: Array) -> Array | None:
+        """Return the same with the normal matrix (u, u) of further passes added; None if a direction remains open."""
+        phases = self._solved(further)
+        return None if any(one.deficiency for one in phases) else _noise_sigmas(phases)
+
+    def _solved(self, more: Array) -> list[Solution]:
         estimated, size = self.solution.estimated, len(self.normals[0])
         prior = np.zeros((size, size))
         prior[np.ix_(estimated, estimated)] = self.solution.prior
-        vague = vague_prior(prior, estimated.tolist())
-        phases = [
-            solve(normal + vague + further, np.zeros(size), estimated.tolist(), prior) for normal in self.normals
-        ]
-        variances = [np.diag(one.noise_covariance())[:N_MOUNT] for one in phases]
-        return np.asarray(np.sqrt(np.maximum(np.mean(variances, axis=0), 0.0)))
+        return [solve(normal + more, np.zeros(size), estimated.tolist(), prior) for normal in self.normals]
 
 
-def vague_prior(prior: Array, estimated: Sequence[int]) -> Array:
-    """Return a normal matrix (u, u): the sigma :data:`VAGUE` of the estimated parameters without prior information.
-
-    Parameters
-    ----------
-    prior : ndarray, shape (u, u)
-        Normal matrix of what is known beforehand.
-    estimated : Sequence[int]
-        Numbers of the estimated parameters.
-    """
-    diagonal, numbers = np.zeros(len(prior)), np.asarray(estimated)
-    diagonal[numbers] = np.where(np.diag(prior)[numbers] > 0, 0.0, VAGUE**-2)
-    return np.diag(diagonal)
+def _noise_sigmas(phases: Sequence[Solution]) -> Array:
+    """Return the sigmas (6,) of the mount parameters from noise alone, rad and m, by their mean variances."""
+    variances = [np.diag(one.noise_covariance())[:N_MOUNT] for one in phases]
+    return np.asarray(np.sqrt(np.maximum(np.mean(variances, axis=0), 0.0)))
 
 
 def _gaps(coverage: Coverage) -> list[str]:
@@ -162,8 +155,8 @@ def _remedy(setting: PredictionSetting, coverage: Coverage, determined: _Determi
     best: tuple[float, float, float] | None = None
     for distance in TRIED_M:
         planned = Pass(distance_m=distance, speed_m_s=coverage.speed_m_s, heading_swing_deg=swing_deg)
-        sigma = determined.sigmas(TWICE * predict(setting, [planned], phases=1).normal)
-        if np.any(sigma > VAGUE / 2):  # a direction remains open
+        sigma = determined.with_passes(TWICE * predict(setting, [planned], phases=1).normal)
+        if sigma is None:
             continue
         worst = float(np.max(sigma / WANTED))
         if best is None or worst < best[0]:

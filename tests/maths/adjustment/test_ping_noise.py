@@ -16,6 +16,7 @@ from pipeline.maths.adjustment.ping_noise import (
     with_design_effects,
     with_ping_noise,
 )
+from pipeline.maths.adjustment.robust_weights import NOT_REDUCED, igg3_weights, robust_means
 from pipeline.maths.adjustment.weighting import EpochVarianceFactor, scatter
 
 WALL = ObservedSurface.at("P2", np.array([-1.0, 0.0, 0.0]), np.zeros(3))
@@ -27,11 +28,13 @@ ONES = np.ones(2)
 
 
 def pings(
-    seed: int, correlation: float = 0.0, white: float = 1.0, whole: float = 0.0, offset_m: float = 0.0
-) -> IntervalSums:
+    seed: int, correlation: float = 0.0, white: float = 1.0, whole: float = 0.0, offset_m: float = 0.0,
+    bounds: tuple[float, float] = (1e3, 2e3),
+) -> IntervalSums:  # fmt: skip
     """Pings on the wall, each a line of beams: ``white`` times the INS's variance, ``whole`` times it for the ping.
 
     Beams k apart are correlated by ``correlation`` ** k; in the second half of the pings the wall stands elsewhere.
+    ``bounds``: of robust weights.
     """
     rng = np.random.default_rng(seed)
     noise = SIGMA * rng.normal(size=(PINGS, BEAMS))
@@ -48,9 +51,23 @@ def pings(
     v[PINGS // 2 :] += offset_m
     points = LinearisedPoints(
         record=np.repeat(STEP * np.arange(PINGS), BEAMS), surface=np.zeros(v.size, dtype=int),
-        share=np.repeat(share, BEAMS), features=q.reshape(3, -1), weight=np.full(v.size, SIGMA**-2), v_m=v.ravel(),
+        share=np.repeat(share, BEAMS), features=q.reshape(3, -1), v_m=v.ravel(),
+        weight=igg3_weights(v.ravel() / SIGMA, *bounds) / SIGMA**2,
     )  # fmt: skip
     return interval_sums(points)
+
+
+def test_robust_weights_hide_no_common_noise() -> None:
+    """They take a quarter off what a mean shows of it, and more off the mean's own noise. (It is a fifth of σ / √n.)"""
+    bounds, white = (1.5, 3.0), 0.5 * WHITE
+    sums = [pings(seed, white=0.25, bounds=bounds) for seed in range(20, 24)]
+    right, wrong = (
+        [ping_noise(one, [WALL, TOP], white, LASER, robust).epoch for one in sums]
+        for robust in (robust_means(*bounds), NOT_REDUCED)
+    )
+    sigma = np.sqrt(np.mean([one.sigma**2 for one in right]) / len(sums))
+    assert abs(np.mean([one.factor for one in right]) - 1) < 2.5 * sigma
+    assert np.mean([one.factor for one in wrong]) < 1 - 4 * sigma
 
 
 def test_independent_beams_stay_as_they_are() -> None:
