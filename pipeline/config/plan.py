@@ -56,9 +56,9 @@ class Pass(Model):
 
     @property
     def where(self) -> str:
-        """The pass in a few words: its distance, where along the target if that is told, and whether it leads back."""
-        along = "" if self.middle_m is None else f" at y = {self.middle_m:g} m"
-        return f"{self.distance_m:.1f} m{along}" + (" back" if self.course == "back" else "")
+        """The pass in a few words: its distance, whether it leads back, where along the target if that is told."""
+        passed = f"{self.distance_m:.1f} m" if self.course == "along" else f"{self.distance_m:.1f} m back"
+        return passed if self.middle_m is None else f"{passed} at y = {self.middle_m:g} m"
 
     def seconds(self, half_length_m: float) -> float:
         """Return the time of the pass in seconds; ``half_length_m`` is used if the pass has none of its own."""

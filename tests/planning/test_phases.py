@@ -121,4 +121,4 @@ def test_a_pass_may_tell_its_middle(configs: tuple[PoolConfig, SessionConfig]) -
     tracks = [planned_track(setting, one, 0)[:, 1] for one in setting.plan.passes]
     np.testing.assert_allclose([track.mean() for track in tracks], [3.0, 3.0, 0.0, 0.0], atol=0.01)
     np.testing.assert_allclose(tracks[1][::-1], tracks[0], atol=0.01)
-    assert [one.where for one in setting.plan.passes[:2]] == ["4.0 m at y = 3 m", "4.0 m at y = 3 m back"]
+    assert [one.where for one in setting.plan.passes[:2]] == ["4.0 m at y = 3 m", "4.0 m back at y = 3 m"]
