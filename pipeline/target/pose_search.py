@@ -56,7 +56,9 @@ def search_target_pose(
     coarse = _best_start(TargetPose(dry.voxel_means_m, sigmas), surface, model.half_period_m, azimuth_known, limits)
     label = dry_labeller(model, settings)
     points = TargetPose(dry.points_m, sigmas)
-    pose = refine(points, coarse.parameters, label, surface.planes, least_m=LEAST_M)
+    # the edges of a found target may have drawn the pose to where no point is above the water: begin within the limits
+    start = np.clip(coarse.parameters, -limits, limits) if model.found else coarse.parameters
+    pose = refine(points, start, label, surface.planes, least_m=LEAST_M)
     frame = TargetFrame(rotation_z(pose.parameters[0]), pose.parameters[1:])
     tilted = TiltedTarget(points.points(pose.parameters), np.array(TILT_SIGMAS))
     return LocatedTarget(
