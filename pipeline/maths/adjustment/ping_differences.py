@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pipeline.maths.adjustment.design_matrix import pose_design
 from pipeline.maths.adjustment.interval_sums import N_MOVED, Intervals, IntervalSums, blocks
 from pipeline.maths.adjustment.observed_surface import ObservedSurface
-from pipeline.maths.adjustment.robust_weights import NOT_REDUCED, RobustMeans
+from pipeline.maths.adjustment.robust_weights import RobustMeans
 from pipeline.maths.adjustment.weighting import FEWEST, EpochVarianceFactor
 
 Array = NDArray[np.float64]
@@ -109,13 +109,13 @@ class Lines:
             sloping=(sums.count >= FEWEST) & (values[:, 1] > LEAST_SPREAD),
         )
 
-    def mean_differences(self, robust: RobustMeans = NOT_REDUCED) -> Differences:
+    def mean_differences(self, robust: RobustMeans) -> Differences:
         """Return the differences of the means of successive intervals."""
         first, second = self._pairs(np.ones(len(self.record), dtype=bool))
         squared = (self.mean[second] - self.mean[first]) ** 2
         return self._differences(squared, first, second, self.total, self.of_mean, robust)
 
-    def slope_differences(self, robust: RobustMeans = NOT_REDUCED) -> Differences:
+    def slope_differences(self, robust: RobustMeans) -> Differences:
         """Return the differences of the slopes of successive intervals."""
         first, second = self._pairs(self.sloping)
         alike = np.einsum("ni,ni->n", self.along[first], self.along[second])
