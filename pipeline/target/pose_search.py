@@ -59,6 +59,7 @@ def search_target_pose(
     # the edges of a found target may have drawn the pose to where no point is above the water: begin within the limits
     start = np.clip(coarse.parameters, -limits, limits) if model.found else coarse.parameters
     pose = refine(points, start, label, surface.planes, least_m=LEAST_M)
+    taken_back = model.found and bool(np.isfinite(pose.scale_m))  # with points on its faces, not by the limits alone
     frame = TargetFrame(rotation_z(pose.parameters[0]), pose.parameters[1:])
     tilted = TiltedTarget(points.points(pose.parameters), np.array(TILT_SIGMAS))
     return LocatedTarget(
@@ -68,7 +69,7 @@ def search_target_pose(
         tilt=refine(tilted, np.zeros(6), label, surface.planes, rounds=2),
         rival=best_rival(scan, frame, model, closest, settings.ambiguity_share),
         gate_m=gate_of(pose, settings),
-        within=coarse.or_within(pose.parameters, limits, edges_known=not model.found),
+        within=coarse.or_within(pose.parameters, limits, edges_known=not taken_back),
         pose_sigmas=sigmas,
     )
 
