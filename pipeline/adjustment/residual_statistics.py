@@ -255,9 +255,11 @@ def _drift_rows(problem: CalibrationProblem, adjustment: MountAdjustment, passes
     (Shifts by the drift are not tested: they move both sensors alike, so they only show errors of the INS.)
     """
     drift = adjustment.drift
-    t_ns = problem.model.body.trajectory.t_ns[drift.knots.record]
+    recorded, record = problem.model.body.trajectory, drift.knots.record
+    t_ns, ahead = recorded.t_ns[record], recorded.R_frame_from_body[record][:, :, 0]
     pass_of_knot = pass_of(t_ns, passes["start_ns"].to_numpy(), passes["end_ns"].to_numpy()).astype(np.int64)
-    by_pass = drift_between_passes(drift, problem.prior.noise, pass_of_knot)
+    heading = np.arctan2(ahead[:, 1], ahead[:, 0])
+    by_pass = drift_between_passes(drift, problem.prior.noise, pass_of_knot, heading)
     return [
         {"by": "drift", "sensor": "ins", "family": name, "low": float(number), "width": 1.0}
         | {"count": int(np.sum(pass_of_knot == number))}

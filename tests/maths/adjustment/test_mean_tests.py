@@ -196,22 +196,49 @@ def test_drift_of_a_pass_against_the_others_has_the_sigma_allowed():
     seconds = np.concatenate([start + np.arange(0, 20, 2.0) for start in (0.0, 80.0, 160.0, 240.0)])
     number = np.append(np.repeat(np.arange(4), 10)[:-1], -1)  # the last knot lies behind the last pass
     knots = Knots(np.arange(40), seconds, np.ones(39, dtype=bool))
-    rng = np.random.default_rng(10)
+    rng, one_course = np.random.default_rng(10), np.full(40, 2.8)
     u = []
     for _ in range(400):
-        found = drift_between_passes(DriftEstimate(knots, drifted(rng, noise, seconds)), noise, number)
+        found = drift_between_passes(DriftEstimate(knots, drifted(rng, noise, seconds)), noise, number, one_course)
         assert found.passes.tolist() == [0, 1, 2, 3]
         u.append(found.difference / found.sigma)
     np.testing.assert_allclose(np.sqrt(np.mean(np.square(u), axis=0)), 1.0, atol=0.14)
     step = np.zeros((40, 6))
     step[number == 1, 5] = 0.003
-    values = drift_between_passes(DriftEstimate(knots, step), noise, number).difference
+    values = drift_between_passes(DriftEstimate(knots, step), noise, number, one_course).difference
     np.testing.assert_allclose(values[:, 5], [-0.003 * 10 / 29, 0.003, -0.003 * 10 / 29, -0.003 * 10 / 30])
+
+
+@pytest.mark.parametrize("boat_fixed", [False, True])
+def test_roll_that_keeps_to_the_boat_turns_with_it_on_the_opposite_course(boat_fixed):
+    """The sigma is that of the larger of the two, and nothing but the course tells them apart."""
+    noise = PoseNoise(np.zeros(6), np.array([0.015, 0.015, 0.02, 2e-4, 2e-4, 5e-4]), 200.0)
+    seconds = np.concatenate([start + np.arange(0, 20, 2.0) for start in (0.0, 80.0, 160.0, 240.0)])
+    number, knots = np.repeat(np.arange(4), 10), Knots(np.arange(40), seconds, np.ones(39, dtype=bool))
+    heading = 0.4 + np.pi * (number % 2)
+    rng = np.random.default_rng(11)
+    u, alike = [], []
+    for _ in range(400):
+        values = drifted(rng, noise, seconds)
+        if boat_fixed:
+            turned = (values[:, 3] + 1j * values[:, 4]) * np.exp(1j * heading)
+            values[:, 3:5] = np.column_stack([turned.real, turned.imag])
+        found = drift_between_passes(DriftEstimate(knots, values), noise, number, heading)
+        u.append(found.difference / found.sigma)
+        alike.append(found.sigma[:, 3] / noise.drift[3] / (found.sigma[:, 0] / noise.drift[0]))
+    rms = np.sqrt(np.mean(np.square(u), axis=0))
+    np.testing.assert_allclose(np.delete(rms, [3, 4], axis=1), 1.0, atol=0.14)
+    if boat_fixed:
+        np.testing.assert_allclose(rms[:, 3:5], 1.0, atol=0.14)
+    else:
+        np.testing.assert_allclose(rms[:, 3:5] * np.mean(alike, axis=0)[:, None], 1.0, atol=0.14)
+        assert np.all(rms[:, 3:5] < 0.75)
 
 
 def test_drift_of_a_single_pass_is_held_against_zero():
     noise = PoseNoise(np.zeros(6), np.full(6, 0.01), 200.0)
     knots = Knots(np.arange(3), np.array([0.0, 1.0, 2.0]), np.ones(2, dtype=bool))
-    found = drift_between_passes(DriftEstimate(knots, np.full((3, 6), 0.02)), noise, np.zeros(3, dtype=int))
+    steady = DriftEstimate(knots, np.full((3, 6), 0.02))
+    found = drift_between_passes(steady, noise, np.zeros(3, dtype=int), np.zeros(3))
     np.testing.assert_allclose(found.difference, 0.02)
     np.testing.assert_allclose(found.sigma, 0.01, rtol=0.01)
