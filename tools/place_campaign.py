@@ -13,7 +13,6 @@ import argparse
 import json
 import tempfile
 from dataclasses import dataclass
-from math import cos, radians
 from pathlib import Path
 from typing import Any
 
@@ -131,7 +130,7 @@ def _predicted(
         "passes": [
             {  # seen from the found target, whose origin is on its own largest wall
                 "distance_m": one["distance_m"],
-                "course": "along" if cos(radians(one["azimuth_deg"] - found["target"]["azimuth_deg"])) > 0 else "back",
+                "course": "along" if one["length_m"] > 0 else "back",
                 "speed_m_s": abs(one["speed_m_s"]),
                 "heading_swing_deg": motion.heading.amplitude,
                 "half_length_m": abs(one["length_m"]) / 2,
@@ -141,12 +140,11 @@ def _predicted(
         ],
     }
     plan.write_text(yaml.safe_dump(content), encoding="utf-8")
-    status, said = poolcal(["plan", plan, "--session", place, "--config", pool, "--yaml", out], (0, 1, 2))
+    status, _ = poolcal(["plan", plan, "--session", place, "--config", pool, "--yaml", out], (0, 1, 2))
     given = yaml.safe_load(out.read_text("utf-8"))["given"] if status < 2 else {}  # 2: no plan with a mount so wrong
-    refusal = said.strip() if status == 2 else ""
     sigmas = given.get("sigma_mount_total") or {}
     keys = {"pitch": "pitch_deg", "roll": "roll_deg", "yaw": "yaw_deg", "x": "x_m", "y": "y_m", "z": "z_m"}
-    return {"allowed": status == 0, "plan_refused": refusal} | {
+    return {"allowed": status == 0} | {
         f"planned_{name}": sigmas.get(key, np.nan) * (1000.0 if key.endswith("_m") else 1.0)
         for name, key in keys.items()
     }
@@ -182,6 +180,8 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="number of the first session; default: 0")
     parser.add_argument("--resume", action="store_true", help="keep the rows of an interrupted campaign")
     given = parser.parse_args()
+    if given.first + given.sessions > SEEDS_OF_A_PLACE:
+        parser.error(f"seeds are for {SEEDS_OF_A_PLACE} sessions of a place")
     tables = []
     for place in given.only or (ROUGH_PLACES if given.rough else PLACES):
         first = FIRST_SEED + SEEDS_OF_A_PLACE * list(PLACES).index(place) + given.first

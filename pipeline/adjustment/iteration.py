@@ -21,7 +21,7 @@ from pipeline.maths.adjustment.eliminate_white_noise import ReducedIntervals
 from pipeline.maths.adjustment.parameters import State, kind_of
 from pipeline.maths.adjustment.ping_noise import PingNoise, ping_noise, with_ping_noise
 from pipeline.maths.adjustment.pose_errors import DriftEstimate, PoseNoise
-from pipeline.maths.adjustment.robust_weights import RobustMeans
+from pipeline.maths.adjustment.robust_weights import RobustEffects
 from pipeline.maths.adjustment.roughness import Roughness
 from pipeline.maths.adjustment.solution import Solution, solve
 from pipeline.maths.adjustment.weighting import (
@@ -85,7 +85,7 @@ class MountAdjustment:
             group.information / float(self.weighting.edge_shares[sensor][surface])
             for (sensor, surface), group in self.accumulation.groups.items()
         )
-        return self.weighting.kept * observations + self.last.prior.count - len(self.solution.estimated)
+        return self.weighting.effects.kept * observations + self.last.prior.count - len(self.solution.estimated)
 
     @property
     def between(self) -> Scatter:
@@ -93,7 +93,7 @@ class MountAdjustment:
 
         They show how well intervals, passes and sensors agree.
         """
-        kept, shares = self.weighting.kept, self.weighting.edge_shares
+        kept, shares = self.weighting.effects.kept, self.weighting.edge_shares
         parts = [
             scatter(sums, np.ones(len(sums), dtype=bool), kept, shares[sensor])
             for sensor, sums in self.accumulation.sums.items()
@@ -135,7 +135,7 @@ def adjust_mount(
     if not weighted.deficient:
         # take the INS's noise from the data: white noise, then drift; further steps have the last weights
         laser = last.record_noise(prior.noise, weighted.weighting)
-        last, pings = _with_ping_noise(last, prior.noise.white, laser, weighted.weighting.of_means)
+        last, pings = _with_ping_noise(last, prior.noise.white, laser, weighted.weighting.effects)
         factors |= {"laser": laser} | {head: ping.epoch for head, ping in pings.items()}
         noise = noise_seen_by_laser(prior.noise, laser)
         for _ in range(ROUGH_ROUNDS if prior.from_start else 1):
@@ -175,7 +175,7 @@ def _closed(last: Iterate, noise: PoseNoise, estimated: Integers, reduced: Reduc
 
 
 def _with_ping_noise(
-    last: Iterate, white: Array, laser: EpochVarianceFactor, robust: RobustMeans
+    last: Iterate, white: Array, laser: EpochVarianceFactor, robust: RobustEffects
 ) -> tuple[Iterate, dict[str, PingNoise]]:
     """Return the values with the noise that the soundings of a ping share in their sums; and this noise by head.
 
@@ -187,7 +187,7 @@ def _with_ping_noise(
         Standard deviations of a record's white noise, m and rad.
     laser : EpochVarianceFactor
         Variance factor of this noise, from the laser's points.
-    robust : RobustMeans
+    robust : RobustEffects
         What robust weights do to the means of the soundings.
     """
     pings = {}

@@ -22,7 +22,7 @@ from pipeline.maths.surfaces.voxels import voxels_with_rows
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 VOXEL_M = 0.3
-CUT, SMOOTH_M = 3.0, 0.001  # of robust sigmas of the cells, and the least of these
+CUT, SMOOTH_M = 3.0, 0.001  # robust sigmas of distances from a plane, and the least such sigma
 FEWEST_CELLS, REFITS = 8, 5  # cells of a plane, fits of a plane to its cells
 GROWTH = GrowthLimits(thickness_m=0.03, distance_m=0.06, least_voxels=12)
 SAMPLE = 4000  # points of a plane that are kept for pictures, and tell its scatter; up to twice as many
@@ -94,7 +94,7 @@ def _plane(all_m: Array, rows: Integers, grown: Plane | DryPlane, boat_m: Array)
         cells_m, outline = cells_on(dry_m, normal, distance_m, CELL_M, MARGIN_M)
         used = cells_m[inside(outline, cells_m @ plane_axes(normal).T)]
         away = np.abs(used @ normal - distance_m)
-        used = used[away <= CUT * max(NORMAL * float(np.median(away)) if len(away) else 0.0, SMOOTH_M)]
+        used = used[away <= _scatter_cut_m(away)]
         if len(outline) < 3 or len(used) < FEWEST_CELLS:
             break
         mean = used.mean(axis=0)
@@ -135,6 +135,11 @@ def _plane(all_m: Array, rows: Integers, grown: Plane | DryPlane, boat_m: Array)
     return replace(made, refused=_refusal(made))
 
 
+def _scatter_cut_m(away_m: Array) -> float:
+    """Return :data:`CUT` robust sigmas of distances (n,) >= 0 from a plane."""
+    return CUT * max(NORMAL * float(np.median(away_m)) if len(away_m) else 0.0, SMOOTH_M)
+
+
 def _near_the_edge(on_m: Array, away_m: Array, normal: Array, coarse: Array) -> Array:
     """Return the outline (k, 2) of the points (n, 3) on a plane by small cells; the coarse one if they are too few.
 
@@ -144,11 +149,12 @@ def _near_the_edge(on_m: Array, away_m: Array, normal: Array, coarse: Array) -> 
     three sigmas of the wall's own points: an end that stands off by more is left out. (By 3 cm, the pans of sheet
     piling came out 4 to 6 cm too wide, and the scatter of their edges passed for noise of the INS.)
     """
-    in_plane, some = on_m @ plane_axes(normal).T, slice(None, None, len(on_m) // SAMPLE | 1)
+    in_plane = on_m @ plane_axes(normal).T
+    some = slice(None, None, len(on_m) // SAMPLE | 1)  # an odd step: scanners' lines alternate
     within = inside(coarse, in_plane[some])
     if len(coarse) < 3 or not within.any():
         return coarse
-    in_plane = in_plane[away_m <= CUT * max(NORMAL * float(np.median(away_m[some][within])), SMOOTH_M)]
+    in_plane = in_plane[away_m <= _scatter_cut_m(away_m[some][within])]
     low, high = coarse.min(axis=0), coarse.max(axis=0)
     in_plane = in_plane[np.all((in_plane > low - BEYOND_M) & (in_plane < high + BEYOND_M), axis=1)]
     cells, inverse, count = cells_of(in_plane, EDGE_CELL_M)

@@ -24,7 +24,7 @@ from pipeline.limits.verdict_limits import largest_sigmas, limits_by_setting, so
 from pipeline.maths.adjustment.solution import ConsiderErrors, Solution, solve, weakest_direction
 from pipeline.maths.mount_parameters import N_MOUNT, PARAMETERS
 from pipeline.mount import mount_of
-from pipeline.planning.observability import VAGUE, Coverage, geometry_advice
+from pipeline.planning.observability import Coverage, geometry_advice, vague_information
 from pipeline.planning.prediction import PredictedPasses, predict
 from pipeline.planning.setting import PredictionSetting, setting_of
 
@@ -100,8 +100,7 @@ class _Adjustment:
     """Inputs of an adjustment of predicted passes, apart from the passes.
 
     ``turn_s``: time of a turn; ``considered``: errors of the fixed parameters; ``free``: numbers of the estimated
-    parameters; ``prior`` (u, u): normal matrix of what is known of them beforehand; ``vague`` (u,): weak information on
-    the surfaces, for phases of the boat's unrest in which one is not seen.
+    parameters; ``prior`` (u, u): normal matrix of what is known of them beforehand.
     """
 
     setting: PredictionSetting
@@ -109,7 +108,6 @@ class _Adjustment:
     considered: ConsiderErrors
     free: list[int]
     prior: Array
-    vague: Array
 
     def accuracy(self, passes: Sequence[Pass]) -> Accuracy:
         """Return the predicted accuracy of a calibration from these passes.
@@ -120,11 +118,11 @@ class _Adjustment:
         leaves the mount open leaves the plan without a result.
         """
         predicted = predict(self.setting, passes, self.turn_s, single_faces=True)
-        prior = np.pad(self.prior, (0, len(predicted.with_faces[0]) - len(self.prior)))
-        vague = np.diag(np.pad(self.vague, (0, len(prior) - len(self.vague))))
+        prior = np.pad(self.prior, (0, len(predicted.normal) - len(self.prior)))
+        vague = vague_information(len(prior), self.setting.state.surface_slice)
         average, *phases = (
             solve(normal + prior, np.zeros(len(prior)), self.free, prior)
-            for normal in (np.mean(predicted.with_faces, axis=0), *(one + vague for one in predicted.with_faces))
+            for normal in (predicted.normal, *(one + vague for one in predicted.normals))
         )
         solution = max(average, *phases, key=lambda one: one.deficiency)  # the average's, unless a phase tells less
         random = np.mean([one.noise_covariance()[:N_MOUNT, :N_MOUNT] for one in phases], axis=0)
@@ -184,9 +182,7 @@ def assess_plan(plan: Plan, pool: PoolConfig, session: SessionConfig) -> PlanAss
     known = known_parameters(setting.state, considered, pool.adjust.free)
     if known is not None:
         free, prior = sorted({*free, *known.numbers.tolist()}), known.pseudo_observations(setting.state).normal
-    vague = np.zeros(setting.state.size)
-    vague[setting.state.surface_slice] = VAGUE**-2
-    adjustment = _Adjustment(setting, turn_s, considered, free, prior, vague)
+    adjustment = _Adjustment(setting, turn_s, considered, free, prior)
     given = adjustment.accuracy(plan.passes)
     speeds, swings = (np.median([getattr(p, name) for p in plan.passes]) for name in ("speed_m_s", "heading_swing_deg"))
     coverage = Coverage(
@@ -202,7 +198,7 @@ def assess_plan(plan: Plan, pool: PoolConfig, session: SessionConfig) -> PlanAss
         heading_swing_deg=float(swings),
     )
     size = setting.state.size
-    normals = [normal[:size, :size] + prior + np.diag(vague) for normal in given.predicted.with_faces]
+    normals = [normal[:size, :size] + prior for normal in given.predicted.normals]
     advice = geometry_advice(setting, coverage, normals, given.solution)
     better = None
     if plan.candidates and plan.budget is not None:
@@ -241,9 +237,7 @@ def _best_within_budget(
     setting, free, turn_s = adjustment.setting, adjustment.free, adjustment.turn_s
     predicted = [predict(setting, [candidate], phases=1) for candidate in candidates]
     bounds = largest_sigmas(limits)
-    vague = np.zeros((setting.state.size, setting.state.size))
-    vague[free, free] = VAGUE**-2
-    vague = vague + adjustment.prior
+    vague = vague_information(setting.state.size, free) + adjustment.prior
 
     def cost(normal: Array) -> float:
         covariance = solve(vague + normal, np.zeros(len(normal)), free).covariance[:N_MOUNT, :N_MOUNT]

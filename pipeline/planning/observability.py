@@ -13,6 +13,7 @@ from pipeline.planning.prediction import predict
 from pipeline.planning.setting import PredictionSetting
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 NEAR_M = 1.5  # distances that differ by less count as one
 WANTED_DEG, WANTED_M = 0.025, 0.004  # a larger random sigma is worth another pass
 WANTED = np.repeat([np.radians(WANTED_DEG), WANTED_M], 3)
@@ -29,6 +30,13 @@ HORIZONTAL = (
     "no horizontal face is seen by both sensors: only the boat's rolling and pitching determine the sonar's height, "
     "and a still boat leaves it open"
 )
+
+
+def vague_information(size: int, numbers: Integers | Sequence[int] | slice) -> Array:
+    """Return a normal matrix (u, u) that knows these of u parameters to :data:`VAGUE`."""
+    weight = np.zeros(size)
+    weight[numbers] = VAGUE**-2
+    return np.diag(weight)
 
 
 @dataclass(frozen=True)
@@ -79,7 +87,7 @@ def geometry_advice(
     solution : Solution
         Solution of these normal equations, of their mean.
     """
-    determined = _Determined(normals, solution)
+    determined = _Determined(normals, solution, setting.state.surface_slice)
     gaps, sigma = _gaps(coverage), determined.sigmas()
     pair = None if solution.deficiency else correlated_pair(solution.covariance[:N_MOUNT, :N_MOUNT])
     if not (gaps or np.any(sigma > WANTED)):
@@ -91,30 +99,35 @@ def geometry_advice(
 
 @dataclass(frozen=True)
 class _Determined:
-    """Information from the passes: normal matrices (u, u) by phase, with prior information; their mean's solution."""
+    """Information from the passes: normal matrices (u, u) by phase, with prior information; their mean's solution.
+
+    ``surfaces``: the numbers of the planes' parameters. A phase that does not show a plane leaves it vague.
+    """
 
     normals: Sequence[Array]
     solution: Solution
+    surfaces: slice
 
     def sigmas(self) -> Array:
         """Return the sigmas of the mount parameters (6,) from noise alone, rad and m, in the mean over the phases.
 
         Every parameter has the prior sigma :data:`VAGUE`, so the sigmas are finite even if a direction is open.
         """
-        vague = np.zeros(len(self.normals[0]))
-        vague[self.solution.estimated] = VAGUE**-2
-        return _noise_sigmas(self._solved(np.diag(vague)))
+        vague = vague_information(len(self.normals[0]), self.solution.estimated)
+        return _noise_sigmas([self._solved(normal + vague) for normal in self.normals])
 
     def with_passes(self, further: Array) -> Array | None:
         """Return the same with the normal matrix (u, u) of further passes added; None if a direction remains open."""
-        phases = self._solved(further)
-        return None if any(one.deficiency for one in phases) else _noise_sigmas(phases)
+        vague = vague_information(len(further), self.surfaces)
+        phases = [self._solved(normal + vague + further) for normal in self.normals]
+        average = self._solved(np.mean(self.normals, axis=0) + further)
+        return None if any(one.deficiency for one in (average, *phases)) else _noise_sigmas(phases)
 
-    def _solved(self, more: Array) -> list[Solution]:
-        estimated, size = self.solution.estimated, len(self.normals[0])
+    def _solved(self, normal: Array) -> Solution:
+        estimated, size = self.solution.estimated, len(normal)
         prior = np.zeros((size, size))
         prior[np.ix_(estimated, estimated)] = self.solution.prior
-        return [solve(normal + more, np.zeros(size), estimated.tolist(), prior) for normal in self.normals]
+        return solve(normal, np.zeros(size), estimated.tolist(), prior)
 
 
 def _noise_sigmas(phases: Sequence[Solution]) -> Array:

@@ -53,16 +53,20 @@ class PassSums:
 
 @dataclass(frozen=True)
 class PredictedPasses:
-    """Prediction for passes: normal matrix (u, u) of all parameters; points by sensor and face, and time, by pass.
+    """Prediction for passes: normal matrices of all parameters; points by sensor and face, and time, by pass.
 
-    Normal matrix and points are means over the phases of the boat's unrest. with_faces: by phase, the normal matrix
-    (u + f, u + f) with the shifts of single faces after all others; none if they are left out.
+    normals: by phase of the boat's unrest, (u, u), or (u + f, u + f) with the shifts of single faces after all others.
+    Points are means over the phases.
     """
 
-    normal: Array
-    with_faces: tuple[Array, ...]
+    normals: tuple[Array, ...]
     points: list[dict[str, Array]]
     seconds: list[float]
+
+    @property
+    def normal(self) -> Array:
+        """Mean of the normal matrices over the phases."""
+        return np.asarray(np.mean(self.normals, axis=0))
 
 
 def predict(
@@ -90,18 +94,17 @@ def predict(
     single_faces : bool
         Whether the shifts of single faces are parameters, too.
     """
-    normals, averaged, size = [], [], setting.state.size
+    normals, averaged = [], []
     for phase in range(phases):
         sums = [_pass_sums(setting, planned, phase * APART + number) for number, planned in enumerate(passes)]
         normals.append(_normal(setting, sums, turn_s, single_faces))
         averaged.append(sums)
-    first, normal = averaged[0], np.asarray(np.mean(normals, axis=0))
+    first = averaged[0]
     points = [
         {sensor: np.mean([sums[k].points[sensor] for sums in averaged], axis=0) for sensor in first[k].points}
         for k in range(len(passes))
     ]
-    with_faces = tuple(normals) if single_faces else ()
-    return PredictedPasses(normal[:size, :size], with_faces, points, [sums.seconds for sums in first])
+    return PredictedPasses(tuple(normals), points, [sums.seconds for sums in first])
 
 
 def _pass_sums(setting: PredictionSetting, planned: Pass, number: int) -> PassSums:

@@ -12,9 +12,11 @@ from pipeline.config.plan import Plan
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import SessionConfig
 from pipeline.config.yaml_models import parse
-from pipeline.planning import assessment
+from pipeline.maths.adjustment.solution import solve
+from pipeline.planning import assessment, observability
 from pipeline.planning.assessment import Accuracy
-from pipeline.planning.prediction import planned_track, predict
+from pipeline.planning.observability import Coverage, geometry_advice
+from pipeline.planning.prediction import PredictedPasses, planned_track, predict
 from pipeline.planning.setting import setting_of
 from tests.support.docks import DOCK
 from tests.support.simulated import THIN, made
@@ -51,9 +53,9 @@ def test_the_covariance_is_the_mean_over_the_phases_of_the_unrest(given: Accurac
         C = np.linalg.inv(normal[free] + known)
         return np.asarray((C - C @ known @ C)[:6, :6])
 
-    phases = [of_noise(normal) for normal in given.predicted.with_faces]
+    phases = [of_noise(normal) for normal in given.predicted.normals]
     np.testing.assert_allclose(given.random, np.mean(phases, axis=0), rtol=1e-3, atol=1e-11)  # but for the vague prior
-    of_average = of_noise(np.mean(given.predicted.with_faces, axis=0))
+    of_average = of_noise(given.predicted.normal)
     assert np.abs(np.diag(of_average) / np.diag(given.random) - 1).max() > 0.005
 
 
@@ -67,8 +69,8 @@ def with_last_phase(
     """The same plan, if the normal matrix of the last phase were another one."""
 
     def planned(changed: Callable[[np.ndarray], np.ndarray]) -> Accuracy:
-        of_phases = (*given.predicted.with_faces[:-1], changed(given.predicted.with_faces[-1]))
-        monkeypatch.setattr(assessment, "predict", lambda *_, **__: replace(given.predicted, with_faces=of_phases))
+        of_phases = (*given.predicted.normals[:-1], changed(given.predicted.normals[-1]))
+        monkeypatch.setattr(assessment, "predict", lambda *_, **__: replace(given.predicted, normals=of_phases))
         return assessment.assess_plan(plan_of(NEAR, FAR), *configs).given
 
     return planned
@@ -95,6 +97,35 @@ def test_a_phase_that_leaves_the_mount_open_leaves_the_plan_without_a_result(wit
     without = with_last_phase(np.zeros_like)
     assert without.solution.deficiency >= 6
     assert np.all(np.isnan(without.total))
+
+
+def test_no_passes_are_advised_after_which_a_plane_is_still_open(
+    given: Accuracy, configs: tuple[PoolConfig, SessionConfig], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They would leave the plan without a result, however well the other planes told the mount."""
+    setting = setting_of(plan_of(NEAR, FAR), *configs)
+    size = setting.state.size
+    free = given.solution.estimated[given.solution.estimated < size]
+    prior = np.zeros((size, size))
+    prior[np.ix_(free, free)] = given.solution.prior[: len(free), : len(free)]
+    coverage = Coverage([4.0], {"P1": 1000, "P3": 1000, "H": 1000}, {"H"}, set(), 0.4, 3.0)
+    poor = [normal[:size, :size] / 1e4 for normal in given.predicted.normals]  # sigmas a hundred times as large
+
+    def advised(seen: np.ndarray) -> str:
+        def further(*passes: Any, **named: Any) -> PredictedPasses:
+            whole = predict(*passes, **named)
+            return replace(whole, normals=tuple(normal * np.outer(seen, seen) for normal in whole.normals))
+
+        monkeypatch.setattr(observability, "predict", further)
+        normals = [normal * np.outer(seen, seen) + prior for normal in poor]
+        solution = solve(np.mean(normals, axis=0), np.zeros(size), free.tolist(), prior)
+        assert solution.deficiency == np.sum(seen == 0)
+        return geometry_advice(setting, coverage, normals, solution).remedy
+
+    all_planes, without_tops = np.ones(size), np.ones(size)
+    without_tops[setting.state.surface_slice.stop - 1] = 0.0
+    assert advised(all_planes).startswith("two more passes at")
+    assert not advised(without_tops)
 
 
 def test_passes_go_by_the_targets_middle_wherever_its_origin_stands() -> None:

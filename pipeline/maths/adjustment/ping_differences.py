@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pipeline.maths.adjustment.design_matrix import pose_design
 from pipeline.maths.adjustment.interval_sums import N_MOVED, Intervals, IntervalSums, blocks
 from pipeline.maths.adjustment.observed_surface import ObservedSurface
-from pipeline.maths.adjustment.robust_weights import RobustMeans
+from pipeline.maths.adjustment.robust_weights import RobustEffects
 from pipeline.maths.adjustment.weighting import FEWEST, EpochVarianceFactor
 
 Array = NDArray[np.float64]
@@ -109,13 +109,13 @@ class Lines:
             sloping=(sums.count >= FEWEST) & (values[:, 1] > LEAST_SPREAD),
         )
 
-    def mean_differences(self, robust: RobustMeans) -> Differences:
+    def mean_differences(self, robust: RobustEffects) -> Differences:
         """Return the differences of the means of successive intervals."""
         first, second = self._pairs(np.ones(len(self.record), dtype=bool))
         squared = (self.mean[second] - self.mean[first]) ** 2
         return self._differences(squared, first, second, self.total, self.of_mean, robust)
 
-    def slope_differences(self, robust: RobustMeans) -> Differences:
+    def slope_differences(self, robust: RobustEffects) -> Differences:
         """Return the differences of the slopes of successive intervals."""
         first, second = self._pairs(self.sloping)
         alike = np.einsum("ni,ni->n", self.along[first], self.along[second])
@@ -125,7 +125,7 @@ class Lines:
         return self._differences(squared, first, second, self.spread, self.of_slope, robust)
 
     def _differences(
-        self, squared: Array, first: Integers, second: Integers, weight: Array, common: Array, robust: RobustMeans
+        self, squared: Array, first: Integers, second: Integers, weight: Array, common: Array, robust: RobustEffects
     ) -> Differences:
         own = robust.variance * (1 / weight[first] + 1 / weight[second])
         shown = robust.shift**2 * (common[first] + common[second])

@@ -22,7 +22,7 @@ Neumann 1941, "Distribution of the ratio of the mean square successive differenc
 wrong for longer: a face that is not where it should be, a drift. That is no noise, and must not make the tests of it
 blind. The first later interval that shares no INS record with an interval is its successor, so the variances add. With
 y² the squared difference over the sum of 1 / Σ w, its mean is d + (f + x) g. (Robust weights take a part of both:
-:func:`~pipeline.maths.adjustment.robust_weights.robust_means`.) d and d' (by surface) and f + x (by the
+:func:`~pipeline.maths.adjustment.robust_weights.robust_effects`.) d and d' (by surface) and f + x (by the
 sensor) follow by regression, in turn, with the weights of maximum likelihood, (d + (f + x) g)⁻². Differences that
 overlap are correlated, so variances of these estimates are 3/2 of those of as many independent ones.
 
@@ -52,7 +52,7 @@ from pipeline.maths.adjustment.ping_differences import (
     outer,
     white_covariance,
 )
-from pipeline.maths.adjustment.robust_weights import NOT_REDUCED, RobustMeans
+from pipeline.maths.adjustment.robust_weights import RobustEffects
 from pipeline.maths.adjustment.weighting import FLAT, EpochVarianceFactor
 
 Array = NDArray[np.float64]
@@ -83,7 +83,7 @@ def ping_noise(
     surfaces: Sequence[ObservedSurface],
     white: Array,
     laser: EpochVarianceFactor,
-    robust: RobustMeans = NOT_REDUCED,
+    robust: RobustEffects,
 ) -> PingNoise:
     """Return the noise that the soundings of a ping share.
 
@@ -97,7 +97,7 @@ def ping_noise(
         Standard deviations of a record's white noise, m and rad.
     laser : EpochVarianceFactor
         Variance factor f of this noise, from the laser's points.
-    robust : RobustMeans, optional
+    robust : RobustEffects
         What robust weights do to means and slopes.
     """
     count, lines = len(surfaces), Lines.of(sums, surfaces, white)

@@ -14,8 +14,8 @@ residuals are those without the estimated drift, which has taken a part of the n
 square is 7 % too small, but that of these differences, and f, only 1 %. (With the drift left in them, f would count all
 that an INS of 10 records a second drifts in half a second.) Robust weights follow v, which contains the common error,
 and take a part of both: κ² c and ν own stand for c and own
-(:func:`~pipeline.maths.adjustment.robust_weights.robust_means`). That is exact for a common error much smaller than the
-points' own noise; of a larger one a mean shows more than κ, and f comes out up to 1.4 % too large. f follows by
+(:func:`~pipeline.maths.adjustment.robust_weights.robust_effects`). That is exact for a common error much smaller than
+the points' own noise; of a larger one a mean shows more than κ, and f comes out up to 1.4 % too large. f follows by
 regression with the weights of maximum likelihood, c / (own_i + own_j + f c)², over all such pairs. Pairs are not
 independent. Neighbours in a sequence of differences have a correlation of -1/2, and the squares of these add half to
 the variance of f. The stated sigma is that of the pairs of neighbours alone: the others, which repeat their information
@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from pipeline.maths.adjustment.interval_sums import BLOCK, N_MOVED, Intervals, blocks
 from pipeline.maths.adjustment.pose_errors import N_POSE
-from pipeline.maths.adjustment.robust_weights import NOT_REDUCED, RobustMeans
+from pipeline.maths.adjustment.robust_weights import RobustEffects
 from pipeline.maths.adjustment.weighting import EpochVarianceFactor
 
 Array = NDArray[np.float64]
@@ -37,7 +37,7 @@ ROUNDS = 3  # of the regression, first with f = 1
 
 
 def record_noise_factor(
-    sums: Intervals, pose_designs: Array, white: Array, robust: RobustMeans = NOT_REDUCED
+    sums: Intervals, pose_designs: Array, white: Array, robust: RobustEffects
 ) -> EpochVarianceFactor:
     """Return the variance factor of the records' white noise, and its sigma (infinite: unknown).
 
@@ -49,7 +49,7 @@ def record_noise_factor(
         Design K of pose errors by surface.
     white : (6,) array
         Standard deviations of a record's white noise, m and rad.
-    robust : RobustMeans, optional
+    robust : RobustEffects
         What robust weights do to the intervals' means.
     """
     g, (mean, own, share) = np.empty((len(sums), N_POSE)), np.empty((3, len(sums)))

@@ -1,6 +1,7 @@
 """Robust weights by the function IGG III, what they leave of the variance of good observations, and robust scales."""
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,51 +36,29 @@ def igg3_weights(normalised: Array, k0: float, k1: float) -> Array:
     return np.where(size <= k0, 1.0, middle)
 
 
-def variance_kept(k0: float, k1: float) -> float:
-    """Return E[w z² | w > 0], the part of the variance of a standard normal z that the weights of IGG III leave.
-
-    With the normal density φ, its integral Φ and Mⱼ = ∫ zʲ φ dz from k0 to k1,
-
-        E[w z²] = 2 (Φ(k0) - 1/2 - k0 φ(k0)) + 2 k0 / (k1 - k0)² · (k1² M₁ - 2 k1 M₂ + M₃),
-        M₁ = φ(k0) - φ(k1),  M₂ = k0 φ(k0) - k1 φ(k1) + Φ(k1) - Φ(k0),  M₃ = k0² φ(k0) - k1² φ(k1) + 2 M₁,
-
-    divided by 2 Φ(k1) - 1, the share of observations with a weight.
-
-    Examples
-    --------
-    >>> round(variance_kept(3.0, 6.0), 4), round(variance_kept(30.0, 60.0), 4)
-    (0.9924, 1.0)
-    """
-    from scipy.special import ndtr
-
-    low, high = (np.exp(-k * k / 2) / np.sqrt(2 * np.pi) for k in (k0, k1))
-    first, between = low - high, float(ndtr(k1) - ndtr(k0))
-    second = k0 * low - k1 * high + between
-    third = k0**2 * low - k1**2 * high + 2 * first
-    reduced = 2 * k0 / (k1 - k0) ** 2 * (k1**2 * first - 2 * k1 * second + third)
-    return float((2 * (ndtr(k0) - 0.5 - k0 * low) + reduced) / (2 * ndtr(k1) - 1))
-
-
 @dataclass(frozen=True)
-class RobustMeans:
-    """What robust weights do to means Σ w v / Σ w, compared with weights that are not reduced (1 and 1).
+class RobustEffects:
+    """What robust weights do to good observations, compared with weights that are not reduced (1, 1 and 1).
 
-    shift: the mean shows this part κ of a small error that all its observations share; variance: that of its
-    observations' own noise is this part ν of 1 / Σ w.
+    kept: part of the variance that observations with a weight still show. Of means Σ w v / Σ w: shift: the mean shows
+    this part κ of a small error that all its observations share; variance: that of its observations' own noise is this
+    part ν of 1 / Σ w.
     """
 
+    kept: float = 1.0
     shift: float = 1.0
     variance: float = 1.0
 
 
-NOT_REDUCED = RobustMeans()
+NOT_REDUCED = RobustEffects()
 
 
-def robust_means(k0: float, k1: float) -> RobustMeans:
-    """Return what the weights of IGG III do to means of normal observations.
+@cache
+def robust_effects(k0: float, k1: float) -> RobustEffects:
+    """Return what the weights of IGG III do to normal observations.
 
-    The weights follow the observations z + e, z standard normal, with their common error e. With ψ(z) = z w(z), the
-    mean of n of them is
+    Of standard normal z they keep E[w z² | w > 0] = E[w z²] / P(|z| < k1). Of a mean of n observations z + e with the
+    common error e, the weights follow z + e. With ψ(z) = z w(z),
 
         Σ w (z + e) / Σ w → E ψ(z + e) / E w(z + e) = e E ψ'(z) / E w(z) + O(e³),    E ψ'(z) = E z ψ(z) = E[w z²]
 
@@ -91,14 +70,17 @@ def robust_means(k0: float, k1: float) -> RobustMeans:
 
     Examples
     --------
-    >>> of = robust_means(3.0, 6.0)
-    >>> round(of.shift, 4), round(of.variance, 4)
-    (0.993, 0.9885)
+    >>> of = robust_effects(3.0, 6.0)
+    >>> round(of.kept, 4), round(of.shift, 4), round(of.variance, 4)
+    (0.9924, 0.993, 0.9885)
+    >>> round(robust_effects(30.0, 60.0).kept, 4)
+    1.0
     """
     z = np.linspace(0.0, min(k1, NORMAL_END), NODES)
-    w = igg3_weights(z, k0, k1)
-    of_w, of_shift, of_square = (float(np.trapezoid(part * np.exp(-z * z / 2))) for part in (w, w * z**2, (w * z) ** 2))
-    return RobustMeans(of_shift / of_w, of_square / of_w)
+    w, density = igg3_weights(z, k0, k1), np.exp(-z * z / 2)
+    parts = (np.ones_like(w), w, w * z**2, (w * z) ** 2)
+    of_any, of_w, of_shift, of_square = (float(np.trapezoid(part * density)) for part in parts)
+    return RobustEffects(of_shift / of_any, of_shift / of_w, of_square / of_w)
 
 
 def histogram(normalised: Array) -> Array:

@@ -8,7 +8,7 @@ interval, pose, mount and surface have no effect. Only the sensor's noise remain
 points spread over the surface and 2 if they lie on a line, like those of one ping. (Noise moves the points of a line
 aside, and a fit to that direction would remove the noise: f came out a third too small.) Robust weights remove a part
 of the variance of good observations too, so the expectation is multiplied by the part that they leave
-(:func:`~pipeline.maths.adjustment.robust_weights.variance_kept`). Where few intervals see a family, f is drawn to the
+(:func:`~pipeline.maths.adjustment.robust_weights.robust_effects`). Where few intervals see a family, f is drawn to the
 sensor's other families: :func:`shrunk_factors`.
 
 **Near edges.** A point near an edge has the weight e / σ², 0 < e < 1, so that it begins to count little by little. But
@@ -36,7 +36,7 @@ from numpy.typing import NDArray
 
 from pipeline.maths.adjustment.interval_sums import N_MOVED, Intervals, IntervalSums, blocks
 from pipeline.maths.adjustment.pose_errors import N_POSE, PoseNoise
-from pipeline.maths.adjustment.robust_weights import NOT_REDUCED, RobustMeans, igg3_weights, robust_means, variance_kept
+from pipeline.maths.adjustment.robust_weights import NOT_REDUCED, RobustEffects, igg3_weights, robust_effects
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -232,14 +232,9 @@ class Weighting:
     white: Array = field(default_factory=lambda: np.zeros(N_POSE))
 
     @property
-    def kept(self) -> float:
-        """The part of the variance of normal observations that the robust weights leave."""
-        return 1.0 if self.robust is None else variance_kept(*self.robust)
-
-    @property
-    def of_means(self) -> RobustMeans:
-        """What the robust weights do to the means of intervals."""
-        return NOT_REDUCED if self.robust is None else robust_means(*self.robust)
+    def effects(self) -> RobustEffects:
+        """What the robust weights do to good observations, and to the means of intervals."""
+        return NOT_REDUCED if self.robust is None else robust_effects(*self.robust)
 
     def weights(self, residuals: Residuals) -> tuple[Array, Array]:
         """Return the robust weights w (n,) and the full weights w e / (κ f σ²) (n,), e being the weight near edges."""

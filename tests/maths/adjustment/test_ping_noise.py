@@ -16,7 +16,7 @@ from pipeline.maths.adjustment.ping_noise import (
     with_design_effects,
     with_ping_noise,
 )
-from pipeline.maths.adjustment.robust_weights import NOT_REDUCED, igg3_weights, robust_means
+from pipeline.maths.adjustment.robust_weights import NOT_REDUCED, igg3_weights, robust_effects
 from pipeline.maths.adjustment.weighting import EpochVarianceFactor, scatter
 
 WALL = ObservedSurface.at("P2", np.array([-1.0, 0.0, 0.0]), np.zeros(3))
@@ -63,7 +63,7 @@ def test_robust_weights_hide_no_common_noise() -> None:
     sums = [pings(seed, white=0.25, bounds=bounds) for seed in range(20, 24)]
     right, wrong = (
         [ping_noise(one, [WALL, TOP], white, LASER, robust).epoch for one in sums]
-        for robust in (robust_means(*bounds), NOT_REDUCED)
+        for robust in (robust_effects(*bounds), NOT_REDUCED)
     )
     sigma = np.sqrt(np.mean([one.sigma**2 for one in right]) / len(sums))
     assert abs(np.mean([one.factor for one in right]) - 1) < 2.5 * sigma
@@ -72,7 +72,7 @@ def test_robust_weights_hide_no_common_noise() -> None:
 
 def test_independent_beams_stay_as_they_are() -> None:
     for seed in range(4):
-        found = ping_noise(pings(seed), [WALL, TOP], WHITE, LASER)
+        found = ping_noise(pings(seed), [WALL, TOP], WHITE, LASER, NOT_REDUCED)
         np.testing.assert_array_equal([found.effects.of_mean, found.effects.of_slope], 1.0)
         assert found.excess == 0
         assert abs(found.epoch.factor - 1) < 4 * found.epoch.sigma
@@ -84,22 +84,22 @@ def test_correlated_beams_have_the_design_effect_of_their_correlation(correlatio
     of_mean = 1 + 2 * np.sum((1 - lags / BEAMS) * correlation**lags)
     b, k = np.linspace(-1.0, 1.0, BEAMS), np.arange(BEAMS)
     of_slope = b @ correlation ** np.abs(np.subtract.outer(k, k)) @ b / (b @ b)
-    found = ping_noise(pings(5, correlation, white=0.0), [WALL, TOP], 0 * WHITE, LASER)
+    found = ping_noise(pings(5, correlation, white=0.0), [WALL, TOP], 0 * WHITE, LASER, NOT_REDUCED)
     assert found.effects.of_mean[0] == pytest.approx(of_mean, rel=0.2)
     assert found.effects.of_slope[0] == pytest.approx(of_slope, rel=0.2)
-    beside_white = ping_noise(pings(5, correlation), [WALL, TOP], WHITE, LASER)  # its means tell less
+    beside_white = ping_noise(pings(5, correlation), [WALL, TOP], WHITE, LASER, NOT_REDUCED)  # its means tell less
     assert beside_white.effects.of_slope[0] == pytest.approx(of_slope, rel=0.2)
 
 
 def test_an_error_of_whole_pings_is_found() -> None:
-    found = ping_noise(pings(6, whole=3.0), [WALL, TOP], WHITE, LASER)
+    found = ping_noise(pings(6, whole=3.0), [WALL, TOP], WHITE, LASER, NOT_REDUCED)
     assert abs(found.excess - 3.0) < 4 * found.epoch.sigma
     np.testing.assert_array_equal(found.effects.of_slope, 1.0)
 
 
 def test_what_lasts_longer_than_pings_is_no_noise() -> None:
     """A wall 3 cm aside in half of the pings: twenty sigmas of their means."""
-    found = ping_noise(pings(7, offset_m=0.03), [WALL, TOP], WHITE, LASER)
+    found = ping_noise(pings(7, offset_m=0.03), [WALL, TOP], WHITE, LASER, NOT_REDUCED)
     assert found.excess == 0
     np.testing.assert_array_equal(found.effects.of_mean, 1.0)
 

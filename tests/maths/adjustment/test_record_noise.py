@@ -5,7 +5,7 @@ import pytest
 
 from pipeline.maths.adjustment.interval_sums import IntervalSums, LinearisedPoints, interval_sums
 from pipeline.maths.adjustment.record_noise import record_noise_factor
-from pipeline.maths.adjustment.robust_weights import NOT_REDUCED, igg3_weights, robust_means
+from pipeline.maths.adjustment.robust_weights import NOT_REDUCED, igg3_weights, robust_effects
 
 EACH = 12
 WHITE = np.array([2.0, 1.0, 1.0, 0.0, 0.0, 0.5])
@@ -44,7 +44,7 @@ def intervals(
 def test_the_noise_is_found_beside_a_drift_of_many_times_its_size(factor: float, steps: list[int]) -> None:
     record = np.cumsum(np.tile(steps, 3000)[:3000])
     sums = intervals(record, factor, drift=0.1)
-    found = record_noise_factor(sums, POSES, WHITE)
+    found = record_noise_factor(sums, POSES, WHITE, NOT_REDUCED)
     assert abs(found.factor - factor) < 4 * found.sigma + 0.02  # of the walk from one interval to the next
     assert found.sigma < 0.05 + 0.1 * factor
 
@@ -53,7 +53,7 @@ def test_what_robust_weights_take_off_the_means_is_given_back() -> None:
     """Of the means' own noise they take more than of a common error: together a third of the factor, or more."""
     bounds = 1.5, 3.0
     sums = intervals(np.arange(3000), 0.1, drift=0.0, bounds=bounds)
-    given = NOT_REDUCED, robust_means(*bounds)
+    given = NOT_REDUCED, robust_effects(*bounds)
     whole, reduced = (record_noise_factor(sums, POSES, WHITE, robust) for robust in given)
     assert abs(reduced.factor - 0.1) < 2 * reduced.sigma
     assert whole.factor < 0.1 - 4 * reduced.sigma
@@ -62,5 +62,5 @@ def test_what_robust_weights_take_off_the_means_is_given_back() -> None:
 def test_without_pairs_or_noise_nothing_is_known() -> None:
     far = np.arange(0, 600, 6)
     for sums, white in ((intervals(far, 1.0, 0.1), WHITE), (intervals(np.arange(100), 1.0, 0.1), 0 * WHITE)):
-        found = record_noise_factor(sums, POSES, white)
+        found = record_noise_factor(sums, POSES, white, NOT_REDUCED)
         assert (found.factor, found.sigma) == (1.0, np.inf)

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import norm
 
-from pipeline.maths.adjustment.robust_weights import igg3_weights, robust_means, variance_kept
+from pipeline.maths.adjustment.robust_weights import igg3_weights, robust_effects
 from pipeline.maths.adjustment.weighting import PRIOR_DOF, shrunk_factors
 
 
@@ -15,13 +15,13 @@ def test_the_variance_that_the_weights_leave_is_the_integral(k0: float, k1: floa
         return float(igg3_weights(np.array([z]), k0, k1)[0] * z * z * norm.pdf(z))
 
     integral = 2 * (quad(squares, 0, k0)[0] + quad(squares, k0, k1)[0])
-    assert variance_kept(k0, k1) == pytest.approx(integral / (1 - 2 * norm.sf(k1)), rel=1e-9)
+    assert robust_effects(k0, k1).kept == pytest.approx(integral / (1 - 2 * norm.sf(k1)), rel=1e-7)
 
 
 @pytest.mark.parametrize(("k0", "k1"), [(1.5, 3.0), (3.0, 6.0), (2.0, 1000.0)])
 def test_of_a_common_error_and_of_their_noise_means_show_what_is_stated(k0: float, k1: float) -> None:
     shift, z = 0.05, np.random.default_rng(5).normal(size=(100_000, 20))
-    of = robust_means(k0, k1)
+    of = robust_effects(k0, k1)
     both = np.concatenate([z, -z]) + shift  # without the noise of the mean
     w = igg3_weights(both, k0, k1)
     assert np.sum(w * both) / w.sum() / shift == pytest.approx(of.shift, abs=0.002)  # 1 would fail
