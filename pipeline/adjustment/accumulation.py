@@ -135,7 +135,8 @@ def reweighted(accumulation: Accumulation, state: State, weighting: Weighting) -
     surfaces, level = np.arange(len(state.surfaces)), np.array([surface.level for surface in state.surfaces])
     for sensor, intervals in accumulation.sums.items():
         factor, share = weighting.factors_of(sensor, surfaces), weighting.edge_shares_of(sensor, surfaces)
-        parts = [scatter(intervals, intervals.surface == number, weighting.effects.kept, share) for number in surfaces]
+        kept = weighting.robust_effects.kept
+        parts = [scatter(intervals, intervals.surface == number, kept, share) for number in surfaces]
         change, dof = np.array([(part.factor, part.dof) for part in parts]).T
         factors[sensor] = shrunk_factors(np.maximum(factor * change, LEAST_SCALE**2), dof, level)
         shares[sensor] = edge_shares(intervals, len(surfaces))

@@ -88,4 +88,4 @@ class Iterate:
             return EpochVarianceFactor(1.0, np.inf)
         surfaces = self.linearisation.state.surfaces
         designs = pose_design(surfaces, np.arange(len(surfaces)))
-        return record_noise_factor(self.linearisation.sums["laser"], designs, noise.white, weighting.effects)
+        return record_noise_factor(self.linearisation.sums["laser"], designs, noise.white, weighting.robust_effects)

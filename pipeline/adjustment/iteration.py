@@ -85,7 +85,7 @@ class MountAdjustment:
             group.information / float(self.weighting.edge_shares[sensor][surface])
             for (sensor, surface), group in self.accumulation.groups.items()
         )
-        return self.weighting.effects.kept * observations + self.last.prior.count - len(self.solution.estimated)
+        return self.weighting.robust_effects.kept * observations + self.last.prior.count - len(self.solution.estimated)
 
     @property
     def between(self) -> Scatter:
@@ -93,7 +93,7 @@ class MountAdjustment:
 
         They show how well intervals, passes and sensors agree.
         """
-        kept, shares = self.weighting.effects.kept, self.weighting.edge_shares
+        kept, shares = self.weighting.robust_effects.kept, self.weighting.edge_shares
         parts = [
             scatter(sums, np.ones(len(sums), dtype=bool), kept, shares[sensor])
             for sensor, sums in self.accumulation.sums.items()
@@ -135,7 +135,7 @@ def adjust_mount(
     if not weighted.deficient:
         # take the INS's noise from the data: white noise, then drift; further steps have the last weights
         laser = last.record_noise(prior.noise, weighted.weighting)
-        last, pings = _with_ping_noise(last, prior.noise.white, laser, weighted.weighting.effects)
+        last, pings = _with_ping_noise(last, prior.noise.white, laser, weighted.weighting.robust_effects)
         factors |= {"laser": laser} | {head: ping.epoch for head, ping in pings.items()}
         noise = noise_seen_by_laser(prior.noise, laser)
         for _ in range(ROUGH_ROUNDS if prior.from_start else 1):

@@ -27,7 +27,7 @@ def groups_table(adjustment: MountAdjustment) -> pd.DataFrame:
     shares = weighting.edge_shares
     by_family = []
     for (sensor, number), group in sorted(adjustment.accumulation.groups.items()):
-        within = scatter(sums[sensor], sums[sensor].surface == number, weighting.effects.kept, shares[sensor])
+        within = scatter(sums[sensor], sums[sensor].surface == number, weighting.robust_effects.kept, shares[sensor])
         factor = float(weighting.factors[sensor][number])
         member = group, Scatter(factor * within.dof, within.dof)
         family = surfaces[number].family

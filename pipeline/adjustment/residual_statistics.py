@@ -256,10 +256,10 @@ def _drift_rows(problem: CalibrationProblem, adjustment: MountAdjustment, passes
     """
     drift = adjustment.drift
     recorded, record = problem.model.body.trajectory, drift.knots.record
-    t_ns, ahead = recorded.t_ns[record], recorded.R_frame_from_body[record][:, :, 0]
+    t_ns, ahead = recorded.t_ns[record], recorded.R_frame_from_body[record, :, 1]
     pass_of_knot = pass_of(t_ns, passes["start_ns"].to_numpy(), passes["end_ns"].to_numpy()).astype(np.int64)
-    heading = np.arctan2(ahead[:, 1], ahead[:, 0])
-    by_pass = drift_between_passes(drift, problem.prior.noise, pass_of_knot, heading)
+    bow = np.arctan2(ahead[:, 1], ahead[:, 0])
+    by_pass = drift_between_passes(drift, problem.prior.noise, pass_of_knot, bow)
     return [
         {"by": "drift", "sensor": "ins", "family": name, "low": float(number), "width": 1.0}
         | {"count": int(np.sum(pass_of_knot == number))}

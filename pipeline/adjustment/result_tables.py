@@ -280,7 +280,7 @@ def _pass_means_table(
         beside = sums.record, np.minimum(sums.record + 1, len(t_ns) - 1)  # one of the two may lie outside the pass
         pass_of_interval = np.maximum(*(pass_of(t_ns[record], starts, ends) for record in beside))
         rows_here = (pass_of_interval == number) & (sums.surface == surface)
-        within = scatter(sums, rows_here, weighting.effects.kept, weighting.edge_shares[sensor])
+        within = scatter(sums, rows_here, weighting.robust_effects.kept, weighting.edge_shares[sensor])
         rows.append(
             {
                 "sensor": sensor,

@@ -114,11 +114,11 @@ class _Adjustment:
 
         Each phase of the boat's unrest is a session that may come. So their covariances are averaged. (That of the
         average normal matrix is smaller: all phases together tell more of a plane than one. At a pier of sheet piling,
-        the sigma of z came out a seventh too small.) A phase that tells nothing of a plane leaves it vague; one that
-        leaves the mount open leaves the plan without a result.
+        the sigma of z came out a seventh too small.) A phase that tells nothing of a plane leaves it, and
+        what it alone tells, vague; one that leaves the mount open leaves the plan without a result.
         """
         predicted = predict(self.setting, passes, self.turn_s, single_faces=True)
-        prior = np.pad(self.prior, (0, len(predicted.normal) - len(self.prior)))
+        prior = np.pad(self.prior, (0, len(predicted.normals[0]) - len(self.prior)))
         vague = vague_information(len(prior), self.setting.state.surface_slice)
         average, *phases = (
             solve(normal + prior, np.zeros(len(prior)), self.free, prior)

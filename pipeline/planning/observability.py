@@ -85,7 +85,7 @@ def geometry_advice(
     normals : Sequence[ndarray], each of shape (u, u)
         Normal matrix of the passes (rad, m), by phase of the boat's unrest; of a session there is one.
     solution : Solution
-        Solution of these normal equations, of their mean.
+        Solution of these normal equations: of their mean, or of a phase that tells less.
     """
     determined = _Determined(normals, solution, setting.state.surface_slice)
     gaps, sigma = _gaps(coverage), determined.sigmas()
@@ -99,9 +99,10 @@ def geometry_advice(
 
 @dataclass(frozen=True)
 class _Determined:
-    """Information from the passes: normal matrices (u, u) by phase, with prior information; their mean's solution.
+    """Information from the passes: normal matrices (u, u) by phase, with prior information, and their solution.
 
-    ``surfaces``: the numbers of the planes' parameters. A phase that does not show a plane leaves it vague.
+    The solution is their mean's, or that of a phase that tells less. ``surfaces``: the numbers of the planes'
+    parameters. A phase that does not show a plane leaves it vague.
     """
 
     normals: Sequence[Array]
@@ -176,7 +177,8 @@ def _remedy(setting: PredictionSetting, coverage: Coverage, determined: _Determi
             best = worst, distance, float(sigma[parameter])
     if best is None or best[2] > before / 2:
         return ""
-    was = "open" if before > VAGUE / 2 else _sized(before, parameter)
+    one_open = VAGUE / 2 / np.sqrt(len(determined.normals))  # if one phase alone leaves it open
+    was = "open" if before > one_open else _sized(before, parameter)
     now = _sized(best[2], parameter)
     return f"two more passes at {best[1]:.0f} m would bring sigma {MOUNT_WORDS[parameter]} from {was} to {now}"
 

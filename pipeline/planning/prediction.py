@@ -9,6 +9,7 @@ Roughness of the wet faces that is stated beforehand counts among the passes tha
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,7 +64,7 @@ class PredictedPasses:
     points: list[dict[str, Array]]
     seconds: list[float]
 
-    @property
+    @cached_property
     def normal(self) -> Array:
         """Mean of the normal matrices over the phases."""
         return np.asarray(np.mean(self.normals, axis=0))

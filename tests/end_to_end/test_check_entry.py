@@ -44,7 +44,7 @@ def asked(finished: Path, file: Path, *more: object) -> tuple[int, dict[str, Any
     [
         ("测深.xyz", UTM, 3, False),
         ("a.csv", "EPSG:4979", 3, True),
-        ("a.laz", UTM, 3, False),
+        pytest.param("a.laz", UTM, 3, False, marks=pytest.mark.thorough),
         ("a.las", "EPSG:4978", 3, False),
         ("a.xyz", "EPSG:4549", 2, False),
     ],

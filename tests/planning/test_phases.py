@@ -12,10 +12,8 @@ from pipeline.config.plan import Plan
 from pipeline.config.pool import PoolConfig
 from pipeline.config.session import SessionConfig
 from pipeline.config.yaml_models import parse
-from pipeline.maths.adjustment.solution import solve
 from pipeline.planning import assessment, observability
 from pipeline.planning.assessment import Accuracy
-from pipeline.planning.observability import Coverage, geometry_advice
 from pipeline.planning.prediction import PredictedPasses, planned_track, predict
 from pipeline.planning.setting import setting_of
 from tests.support.docks import DOCK
@@ -103,29 +101,23 @@ def test_no_passes_are_advised_after_which_a_plane_is_still_open(
     given: Accuracy, configs: tuple[PoolConfig, SessionConfig], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """They would leave the plan without a result, however well the other planes told the mount."""
-    setting = setting_of(plan_of(NEAR, FAR), *configs)
-    size = setting.state.size
-    free = given.solution.estimated[given.solution.estimated < size]
-    prior = np.zeros((size, size))
-    prior[np.ix_(free, free)] = given.solution.prior[: len(free), : len(free)]
-    coverage = Coverage([4.0], {"P1": 1000, "P3": 1000, "H": 1000}, {"H"}, set(), 0.4, 3.0)
-    poor = [normal[:size, :size] / 1e4 for normal in given.predicted.normals]  # sigmas a hundred times as large
+    tops = setting_of(plan_of(NEAR, FAR), *configs).state.surface_slice.stop - 1
 
-    def advised(seen: np.ndarray) -> str:
-        def further(*passes: Any, **named: Any) -> PredictedPasses:
-            whole = predict(*passes, **named)
-            return replace(whole, normals=tuple(normal * np.outer(seen, seen) for normal in whole.normals))
+    def advised(*hidden: int) -> str:
+        def seen(predicted: PredictedPasses, share: float) -> PredictedPasses:
+            shown = np.ones(len(predicted.normals[0]))
+            shown[list(hidden)] = 0.0
+            return replace(predicted, normals=tuple(share * one * np.outer(shown, shown) for one in predicted.normals))
 
-        monkeypatch.setattr(observability, "predict", further)
-        normals = [normal * np.outer(seen, seen) + prior for normal in poor]
-        solution = solve(np.mean(normals, axis=0), np.zeros(size), free.tolist(), prior)
-        assert solution.deficiency == np.sum(seen == 0)
-        return geometry_advice(setting, coverage, normals, solution).remedy
+        poor = seen(given.predicted, 1e-4)  # sigmas a hundred times as large
+        monkeypatch.setattr(assessment, "predict", lambda *_, **__: poor)
+        monkeypatch.setattr(observability, "predict", lambda *passes, **named: seen(predict(*passes, **named), 1.0))
+        plan = assessment.assess_plan(plan_of(NEAR, FAR), *configs)
+        assert plan.given.solution.deficiency == len(hidden)
+        return plan.remedy
 
-    all_planes, without_tops = np.ones(size), np.ones(size)
-    without_tops[setting.state.surface_slice.stop - 1] = 0.0
-    assert advised(all_planes).startswith("two more passes at")
-    assert not advised(without_tops)
+    assert advised().startswith("two more passes at")
+    assert not advised(tops)
 
 
 def test_passes_go_by_the_targets_middle_wherever_its_origin_stands() -> None:

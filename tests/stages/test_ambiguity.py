@@ -187,7 +187,7 @@ def test_the_scanner_must_look_at_the_upper_end(uppermost_deg: float, ambiguous:
         {"target": PATENT | {"azimuth_deg": 163.0, "low_side": "north"}},
         {"surroundings": {"origin_error_m": [-0.3, 0.3, -0.15], "azimuth_error_deg": 3.0}},
         {"surroundings": {"back_wall": False}, "track": {"distances_m": [6.0]}},
-        {"laser": {"coarse_angle_deg": 0.5}},
+        pytest.param({"laser": {"coarse_angle_deg": 0.5}}, marks=pytest.mark.thorough),
     ],
     ids=["turned", "origin off", "sky behind, one pass", "laser's mount off"],
 )

@@ -33,20 +33,21 @@ others), and ξ the Gauss-Markov process,
 
     Var(Σ c ξ) = c' K c,    K_ij = σ² exp(-|t_i - t_j| / τ)
 
-for each of the six components. The estimate of ξ has at most that variance (the estimate is the conditional mean:
-Var ξ = variance of the estimate + variance of its error). So a test against the root of that variance may reject too
-rarely, never too often.
+for each of the six components. The estimate of such a process has at most that variance (the estimate is the
+conditional mean: Var ξ = variance of the estimate + variance of its error). So a test against the root of that variance
+may reject too rarely, never too often.
 
 An INS's errors of roll and pitch may keep to the earth (tilt of its platform) or to the boat (its accelerometers); the
-adjustment has them in the target frame. An error β that keeps to the boat is ξ = R_z(α) β there, α the boat's heading:
-on the opposite course it has the opposite sign. With the horizontal turns as a complex number, ξ_x + i ξ_y =
-exp(iα) (β_x + i β_y), both of one σ,
+adjustment has them in the target frame, as if they kept to the earth. An error β that keeps to the boat is ξ = R_z(α) β
+there, α the angle of the boat's bow about z, anticlockwise: on the opposite course it has the opposite sign. With the
+horizontal turns as a complex number, ξ_x + i ξ_y = exp(iα) (β_x + i β_y), both of one σ,
 
     Var(Σ c ξ) = Re(d* K d),    d_j = c_j exp(iα_j),
 
-c' K c of weights that turn with the boat: as large as the first on one course, and larger between opposite ones. Which
-of the two an INS does is not known: the test takes the larger one. (In a lock that is passed both ways, a roll error of
-2.5 sigmas that kept to the boat was five sigmas of the first kind, and 4 of 60 good sessions were rejected.)
+c' K c of weights that turn with the boat: as large as the first on one course, mostly larger between opposite ones.
+Which of the two an INS does is not known. The variance of any mixture is a weighted mean of both, so the test takes the
+larger one. (In a lock that is passed both ways, a roll error of 2.5 sigmas that kept to the boat was five sigmas of the
+first kind, and 4 of 60 good sessions were rejected.)
 """
 
 from dataclasses import dataclass, replace
@@ -189,7 +190,7 @@ class PassDrift:
 
 
 def drift_between_passes(
-    drift: DriftEstimate, noise: PoseNoise, pass_of_knot: Integers, heading_rad: Array
+    drift: DriftEstimate, noise: PoseNoise, pass_of_knot: Integers, bow_rad: Array
 ) -> PassDrift:
     """Return the mean of the drift in each pass minus its mean in the others; for a single pass, its mean itself.
 
@@ -198,11 +199,11 @@ def drift_between_passes(
     drift : DriftEstimate
         The estimated drift, k knots.
     noise : PoseNoise
-        Standard deviations and time constant of the drift.
+        Standard deviations and time constant of the drift; the turns about x and y have one standard deviation.
     pass_of_knot : (k,) array
         Number of each knot's pass; negative: no pass.
-    heading_rad : (k,) array
-        The boat's heading at each knot about the target's z axis.
+    bow_rad : (k,) array
+        Angle of the boat's bow at each knot about the target's z axis, anticlockwise.
     """
     passes = np.unique(pass_of_knot[pass_of_knot >= 0])
     inside = pass_of_knot[:, None] == passes
@@ -210,7 +211,7 @@ def drift_between_passes(
     weight = inside / inside.sum(axis=0) - outside / np.maximum(outside.sum(axis=0), 1)  # (k, p)
     decay = np.exp(-np.diff(drift.knots.seconds, prepend=drift.knots.seconds[:1]) / noise.time_constant_s)
     of_earth = _variance(weight, decay)
-    of_boat = _variance(weight * np.exp(1j * heading_rad)[:, None], decay)
+    of_boat = _variance(weight * np.exp(1j * bow_rad)[:, None], decay)
     sigma = np.sqrt(of_earth)[:, None] * noise.drift
     sigma[:, ROLL_PITCH] = np.sqrt(np.maximum(of_earth, of_boat))[:, None] * noise.drift[ROLL_PITCH]
     return PassDrift(passes, weight.T @ drift.values, sigma)

@@ -232,7 +232,7 @@ class Weighting:
     white: Array = field(default_factory=lambda: np.zeros(N_POSE))
 
     @property
-    def effects(self) -> RobustEffects:
+    def robust_effects(self) -> RobustEffects:
         """What the robust weights do to good observations, and to the means of intervals."""
         return NOT_REDUCED if self.robust is None else robust_effects(*self.robust)
 

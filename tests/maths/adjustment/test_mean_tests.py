@@ -209,21 +209,22 @@ def test_drift_of_a_pass_against_the_others_has_the_sigma_allowed():
     np.testing.assert_allclose(values[:, 5], [-0.003 * 10 / 29, 0.003, -0.003 * 10 / 29, -0.003 * 10 / 30])
 
 
+@pytest.mark.parametrize("turn", [np.pi, np.pi / 2], ids=["opposite", "across"])
 @pytest.mark.parametrize("boat_fixed", [False, True])
-def test_roll_that_keeps_to_the_boat_turns_with_it_on_the_opposite_course(boat_fixed):
-    """The sigma is that of the larger of the two, and nothing but the course tells them apart."""
+def test_roll_that_keeps_to_the_boat_turns_with_it_on_another_course(boat_fixed, turn):
+    """The sigma is that of the kind whose passes differ more: here that of errors that keep to the boat."""
     noise = PoseNoise(np.zeros(6), np.array([0.015, 0.015, 0.02, 2e-4, 2e-4, 5e-4]), 200.0)
     seconds = np.concatenate([start + np.arange(0, 20, 2.0) for start in (0.0, 80.0, 160.0, 240.0)])
     number, knots = np.repeat(np.arange(4), 10), Knots(np.arange(40), seconds, np.ones(39, dtype=bool))
-    heading = 0.4 + np.pi * (number % 2)
+    bow = 0.4 + turn * (number % 2)
     rng = np.random.default_rng(11)
     u, alike = [], []
     for _ in range(400):
         values = drifted(rng, noise, seconds)
         if boat_fixed:
-            turned = (values[:, 3] + 1j * values[:, 4]) * np.exp(1j * heading)
+            turned = (values[:, 3] + 1j * values[:, 4]) * np.exp(1j * bow)
             values[:, 3:5] = np.column_stack([turned.real, turned.imag])
-        found = drift_between_passes(DriftEstimate(knots, values), noise, number, heading)
+        found = drift_between_passes(DriftEstimate(knots, values), noise, number, bow)
         u.append(found.difference / found.sigma)
         alike.append(found.sigma[:, 3] / noise.drift[3] / (found.sigma[:, 0] / noise.drift[0]))
     rms = np.sqrt(np.mean(np.square(u), axis=0))
@@ -232,7 +233,7 @@ def test_roll_that_keeps_to_the_boat_turns_with_it_on_the_opposite_course(boat_f
         np.testing.assert_allclose(rms[:, 3:5], 1.0, atol=0.14)
     else:
         np.testing.assert_allclose(rms[:, 3:5] * np.mean(alike, axis=0)[:, None], 1.0, atol=0.14)
-        assert np.all(rms[:, 3:5] < 0.75)
+        assert np.all(rms[:, 3:5] < (0.75 if turn == np.pi else 0.9))
 
 
 def test_drift_of_a_single_pass_is_held_against_zero():

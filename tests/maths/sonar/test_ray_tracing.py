@@ -20,7 +20,7 @@ def integrated(cast: Cast, depth: float, angle: float, time: float) -> tuple[flo
         g = (cast.speed_m_s[k + 1] - cast.speed_m_s[k]) / (cast.depth_m[k + 1] - cast.depth_m[k]) if inside else 0.0
         return [c * np.cos(theta), c * np.sin(theta), g * np.sin(theta)]
 
-    end = solve_ivp(rate, (0, time), [depth, 0.0, angle], rtol=1e-10, atol=1e-12, max_step=time / 2000).y[:, -1]
+    end = solve_ivp(rate, (0, time), [depth, 0.0, angle], rtol=1e-10, atol=1e-12, max_step=time / 500).y[:, -1]
     return float(end[1]), float(end[0])
 
 
