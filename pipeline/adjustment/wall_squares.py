@@ -1,6 +1,6 @@
 """Squares of unsurveyed walls before which something stands: their soundings are left out, and counted.
 
-A reading of all soundings sorts the residuals by face, square, pass and size. Which squares are mixed is said by
+A reading of all soundings sorts the residuals by face, cell, pass and size. Which squares are mixed is said by
 :mod:`~pipeline.maths.adjustment.mixed_squares`. The laser's spot is small, so it has none.
 """
 
@@ -12,14 +12,14 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline.adjustment.face_squares import SIDE_M, OutsideSquares, codes_of, faces_of, places_of
+from pipeline.adjustment.face_cells import CELL_M, OutsideCells, codes_of, faces_of, places_of
 from pipeline.adjustment.iteration import MountAdjustment, adjust_mount
 from pipeline.adjustment.observation_model import CurrentValues, ObservationModel
 from pipeline.adjustment.point_sums import summed
 from pipeline.adjustment.problem import CalibrationProblem
 from pipeline.adjustment.weighted_iteration import IterationSettings
 from pipeline.artefacts.streams import Batch, Stream
-from pipeline.maths.adjustment.mixed_squares import PassExcess, mixed
+from pipeline.maths.adjustment.mixed_squares import OverlappingSquares, PassExcess, mixed
 from pipeline.maths.adjustment.parameters import State, kind_of
 from pipeline.maths.geometry.passes import pass_of
 
@@ -34,8 +34,8 @@ MERGED = 1_000_000  # codes of batches that wait, beyond twice those that are kn
 class Squares:
     """Mixed squares of a face as a head of the sonar sees it.
 
-    code (c,): as :func:`~pipeline.adjustment.face_squares.codes_of` gives it; points: soundings in them; share: of all
-    on the face; low_m, high_m: heights above the water between which they lie.
+    code (c,): of their cells, as :func:`~pipeline.adjustment.face_cells.codes_of` gives it; points: soundings in them;
+    share: of all on the face; low_m, high_m: heights above the water between which they lie.
     """
 
     head: str
@@ -49,7 +49,7 @@ class Squares:
     @property
     def area_m2(self) -> float:
         """Return their area."""
-        return len(self.code) * SIDE_M**2
+        return len(self.code) * CELL_M**2
 
 
 def adjust_clear_squares(
@@ -122,7 +122,7 @@ def without_squares(
     for one in squares:
         codes.setdefault(one.head, []).append(one.code)
     return dict(streams) | {
-        head: streams[head].changed(OutsideSquares(problem.model, adjustment.state, head, np.concatenate(of_head)))
+        head: streams[head].changed(OutsideCells(problem.model, adjustment.state, head, np.concatenate(of_head)))
         for head, of_head in codes.items()
     }
 
@@ -130,7 +130,7 @@ def without_squares(
 def _counted(
     batch: Batch, model: ObservationModel, head: str, values: CurrentValues, times_ns: tuple[Integers, Integers]
 ) -> tuple[Integers, Integers]:
-    """Return the codes of squares, passes and bins of residuals, ascending, and the number of soundings of each."""
+    """Return the codes of cells, passes and bins of residuals, ascending, and the number of soundings of each."""
     observed = summed(batch, model, head, values, residuals=True)
     edge_weight = np.asarray(observed.points["edge_weight"], dtype=np.float64)
     inside = edge_weight >= INSIDE
@@ -164,20 +164,20 @@ def _of_face(
     model: ObservationModel, state: State, seen: tuple[str, int], code: Integers, number: Integers
 ) -> list[Squares]:
     """Return the mixed squares of a face as a head has ``seen`` it, from codes (n,) and their numbers; or nothing."""
-    squares, row = np.unique(code // (PASSES * BINS), return_inverse=True)
+    cells, row = np.unique(code // (PASSES * BINS), return_inverse=True)
     soundings, run = np.bincount(row, number).astype(np.int64), code // BINS % PASSES
-    passes = []
+    place = places_of(cells)
+    squares, passes = OverlappingSquares.of(place), []
     for each in np.unique(run).tolist():
-        mine, count = run == each, np.zeros((len(squares), BINS), dtype=np.int64)
+        mine, count = run == each, np.zeros((len(cells), BINS), dtype=np.int64)
         count[row[mine], code[mine] % BINS] = number[mine]
-        passes.append(PassExcess.of(count))
-    place = places_of(squares)
-    is_mixed = mixed(place, soundings, passes)
+        passes.append(PassExcess.of(squares.sums(count)))
+    is_mixed = mixed(squares, soundings, passes)
     if not is_mixed.any():
         return []
     surface = state.surfaces[int(model.faces.surface[seen[1]])]
-    corners = SIDE_M * np.concatenate([place[is_mixed] + corner for corner in product((0, 1), repeat=2)])
+    corners = CELL_M * np.concatenate([place[is_mixed] + corner for corner in product((0, 1), repeat=2)])
     off_m = surface.shift_m + model.height_of_face[seen[1]]
     z = corners @ surface.tangents[:, 2] + surface.centre_m[2] + off_m * surface.normal[2] - model.wet_heights_m[1]
     points = int(soundings[is_mixed].sum())
-    return [Squares(*seen, squares[is_mixed], points, points / soundings.sum(), float(z.min()), float(z.max()))]
+    return [Squares(*seen, cells[is_mixed], points, points / soundings.sum(), float(z.min()), float(z.max()))]

@@ -11,6 +11,10 @@ standard deviations of the usual square of this pass and face from the median; w
 standard deviation is (q₃ - q₁) / 1.349, as for normal errors, and the usual one is the median over the soundings. Large
 noise is off to both sides: the *excess* of a square is the number off on the one less that on the other.
 
+A wall is cut into cells of half a square's side, and every square of two by two cells is judged. Squares overlap, so it
+matters little where the cells begin: with squares side by side a ledge that lay across four of them was found in none,
+and two drawings of one dock left out 3 % of the soundings and 10 %.
+
 A square is mixed if its excess, of all passes together,
 
 * is a larger share of its soundings than usual, by a tenth, and certainly larger by the binomial distribution: all
@@ -20,12 +24,12 @@ A square is mixed if its excess, of all passes together,
 * most of the passes that see the square, and two at least, must have an excess to this side, beyond its own standard
   deviation. A thing stands there in every pass; a bad ping, a fish, an echo of the boat does not.
 
-Amid a thing an echo comes from anywhere between it and the wall, and soundings are off to both sides. So a mixed square
-grows: those beside it that have a tenth more off than usual, to whatever side, belong to it, up to 3 squares away; and
-then all that lie beside these, for a thing does not end where a square does.
+Amid a thing an echo comes from anywhere between it and the wall, and soundings are off to both sides. So mixed squares
+grow: those one cell beside them that have a tenth more off than usual, to whatever side, belong to them, up to 6 cells
+away. All cells of these squares are mixed, and then those beside them, for a thing does not end where a square does.
 
-If all these squares hold more than half of the soundings of a face, no single thing explains them, and none is left
-out: the tests of noise and of residuals speak.
+If all these cells hold more than half of the soundings of a face, no single thing explains them, and none is left out:
+the tests of noise and of residuals speak.
 """
 
 from collections.abc import Iterable
@@ -37,7 +41,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Flags = NDArray[np.bool_]
-FEWEST_SQUARES = 4  # of a face that is judged
+FEWEST_SQUARES = 16  # of a face that is judged: each cell lies in four
 FEWEST_SOUNDINGS = 8  # of a square in a pass that is judged
 QUARTILES_APART = 1.349  # in standard deviations of normal errors
 OFF, CERTAIN = 4.0, 3.0  # usual standard deviations from the median; those of an excess by chance
@@ -45,12 +49,45 @@ LARGER_SHARE = 0.1  # than usual: of the excess of a mixed square; half of it in
 LEAST_SHARE = 0.02  # of the excess of a usual square
 CHANCE = 0.01  # of all squares of a face together
 MOST = 0.5  # of a face's soundings
-BESIDE, GROWN = ((1, 0), (-1, 0), (0, 1), (0, -1)), 3  # columns and rows on; squares
+OF_SQUARE = ((0, 0), (1, 0), (0, 1), (1, 1))  # its cells: columns and rows on
+BESIDE, GROWN = ((1, 0), (-1, 0), (0, 1), (0, -1)), 6  # columns and rows on; cells
+
+
+@dataclass(frozen=True)
+class OverlappingSquares:
+    """All squares of two by two cells that hold a cell of a face with soundings.
+
+    place (c, 2): column and row of the cells; corner (s, 2): those of the squares' lowest cells; cells (s, 4): numbers
+    of the squares' cells; c for one without soundings.
+    """
+
+    place: Integers
+    corner: Integers
+    cells: Integers
+
+    @classmethod
+    def of(cls, place: Integers) -> "OverlappingSquares":
+        """Return the squares of cells at columns and rows (c, 2)."""
+        corner = np.unique(np.concatenate([place - on for on in OF_SQUARE]), axis=0)
+        code = _code(place, corner)
+        order = np.argsort(code)
+        wanted = _code(corner[:, None] + np.array(OF_SQUARE), corner)
+        nearest = order[np.minimum(np.searchsorted(code, wanted, sorter=order), len(order) - 1)]
+        return cls(place, corner, np.where(code[nearest] == wanted, nearest, len(place)))
+
+    def sums(self, of_cells: Integers) -> Integers:
+        """Return the sums (s, ...) over the squares of numbers (c, ...) of the cells."""
+        padded = np.concatenate([of_cells, np.zeros_like(of_cells[:1])])
+        return np.asarray(sum(padded[of_corner] for of_corner in self.cells.T))
+
+    def cells_of(self, found: Flags) -> Flags:
+        """Return which cells (c,) some of the squares (s,) hold."""
+        return np.isin(np.arange(len(self.place)), self.cells[found])
 
 
 @dataclass(frozen=True)
 class PassExcess:
-    """Of each square (c,) of a face in one pass: number of soundings, of those off, and the excess, signed.
+    """Of each square (s,) of a face in one pass: number of soundings, of those off, and the excess, signed.
 
     All are zero where a square is not judged.
     """
@@ -61,7 +98,7 @@ class PassExcess:
 
     @classmethod
     def of(cls, count: Integers) -> "PassExcess":
-        """Return the excess from the numbers of soundings (c, b) by square and bin of their residuals."""
+        """Return the excess from the numbers of soundings (s, b) by square and bin of their residuals."""
         number = count.sum(axis=1)
         first, median, third = (_quantiles(count, share) for share in (0.25, 0.5, 0.75))
         within = (first >= 1) & (third <= count.shape[1] - 1)  # those in the end bins lie anywhere beyond
@@ -72,17 +109,17 @@ class PassExcess:
         return cls(number, above + below, above - below)
 
 
-def mixed(place: Integers, soundings: Integers, passes: Iterable[PassExcess]) -> Flags:
-    """Return whether each square (c,) of a face is mixed, or belongs to one that is, or lies beside it.
+def mixed(squares: OverlappingSquares, soundings: Integers, passes: Iterable[PassExcess]) -> Flags:
+    """Return whether each cell (c,) of a face lies in a mixed square, or in one that belongs to it, or beside them.
 
     Parameters
     ----------
-    place : (c, 2) array
-        Column and row of each square.
+    squares : OverlappingSquares
+        The squares of the face.
     soundings : (c,) array
-        Number of all soundings of each.
+        Number of all soundings of each cell.
     passes : iterable of PassExcess
-        What each pass says.
+        What each pass says of the squares.
     """
     of_passes = list(passes)
     number, off, excess = (np.array([getattr(one, name) for one in of_passes]) for name in ("number", "off", "excess"))
@@ -95,26 +132,30 @@ def mixed(place: Integers, soundings: Integers, passes: Iterable[PassExcess]) ->
     found = voted & to_one_side & _certain(np.abs(all_excess), seen)
     wide = all_off > (_usual_share(all_off, seen) + LARGER_SHARE) * seen
     for _ in range(GROWN):
-        found |= _beside(place, found) & wide
-    found |= _beside(place, found)
-    return np.asarray(found & (soundings[found].sum() <= MOST * soundings.sum()))
+        found |= _beside(squares.corner, found) & wide
+    cells = squares.cells_of(found)
+    cells |= _beside(squares.place, cells)
+    return np.asarray(cells & (soundings[cells].sum() <= MOST * soundings.sum()))
 
 
 def _beside(place: Integers, found: Flags) -> Flags:
-    """Return whether each square (c,) lies beside one of those that are found."""
-    column, row = (place - place.min(axis=0, initial=0)).T
-    height = int(row.max(initial=0)) + 3  # of numbers in a column, so that those beyond its ends are no square's
-    code = column * height + row
-    return np.isin(code, [code[found] + right * height + up for right, up in BESIDE])
+    """Return whether each of these (n,), at columns and rows (n, 2), lies beside one that is found."""
+    return np.isin(_code(place, place), _code(place[found][:, None] + np.array(BESIDE), place))
+
+
+def _code(place: Integers, within: Integers) -> Integers:
+    """Return a number (...,) for each column and row (..., 2) that are within those of others (c, 2), or one beyond."""
+    low, high = within.min(axis=0) - 1, within.max(axis=0) + 1
+    return np.asarray((place - low) @ [high[1] - low[1] + 1, 1])
 
 
 def _usual_share(some: Integers, of: Integers) -> float:
-    """Return the usual share of some soundings (c,) of so many, the median over all."""
+    """Return the usual share of some soundings (s,) of so many, the median over all."""
     return max(_weighted_median(some / np.maximum(of, 1), of), LEAST_SHARE)
 
 
 def _certain(excess: Integers, number: Integers) -> Flags:
-    """Return whether the excess (c,) of so many soundings is a larger share than usual, and certainly larger."""
+    """Return whether the excess (s,) of so many soundings is a larger share than usual, and certainly larger."""
     from scipy.special import bdtrc
 
     judged = number > 0
@@ -126,14 +167,14 @@ def _certain(excess: Integers, number: Integers) -> Flags:
 
 
 def _weighted_median(value: Array, weight: Integers) -> float:
-    """Return the median of values (c,) that count so many times; zero if none counts."""
+    """Return the median of values (s,) that count so many times; zero if none counts."""
     order = np.argsort(value)
     below = np.cumsum(weight[order])
     return float(value[order][np.searchsorted(below, below[-1] / 2)]) if len(below) and below[-1] else 0.0
 
 
 def _quantiles(count: Integers, share: float) -> Array:
-    """Return the places (c,), in bins, below which this share of each square's soundings lies; zero without any."""
+    """Return the places (s,), in bins, below which this share of each square's soundings lies; zero without any."""
     below = np.cumsum(count, axis=1)
     wanted = share * below[:, -1]
     bin_, rows = np.argmax(below >= wanted[:, None], axis=1), np.arange(len(count))

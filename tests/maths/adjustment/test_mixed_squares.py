@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.maths.adjustment.mixed_squares import PassExcess, mixed
+from pipeline.maths.adjustment.mixed_squares import OverlappingSquares, PassExcess, mixed
 
 BINS, MIDDLE, SIGMA = 128, 64.0, 2.0  # sigma in bins
 SQUARES, SOUNDINGS, PASSES = 100, 30, 3
@@ -22,12 +22,16 @@ def noise(*, squares: int = SQUARES, soundings: int = SOUNDINGS, seed: int = 5) 
 
 
 def named(residuals: np.ndarray, place: np.ndarray | None = None) -> list[int]:
-    """Numbers of the squares that are mixed; without places, squares that do not touch."""
+    """Numbers of the cells that are mixed; without places, each is a square's only one, and none touch."""
     counts = [binned(of_pass) for of_pass in residuals]
     number = np.arange(len(counts[0]))
-    place = np.column_stack([3 * number, 0 * number]) if place is None else place
-    soundings = np.sum([count.sum(axis=1) for count in counts], axis=0)
-    return np.flatnonzero(mixed(place, soundings, [PassExcess.of(count) for count in counts])).tolist()
+    return mixed_cells(counts, np.column_stack([3 * number, 0 * number]) if place is None else place)
+
+
+def mixed_cells(counts: Counts, place: np.ndarray) -> list[int]:
+    """Numbers of the cells that are mixed, from the numbers of soundings by pass, cell and bin."""
+    squares, soundings = OverlappingSquares.of(place), np.sum([count.sum(axis=1) for count in counts], axis=0)
+    return np.flatnonzero(mixed(squares, soundings, [PassExcess.of(squares.sums(count)) for count in counts])).tolist()
 
 
 def test_a_clean_wall_has_no_mixed_square() -> None:
@@ -112,23 +116,53 @@ def test_squares_that_stand_off_as_a_whole_are_not_mixed() -> None:
     assert named(noise() + np.linspace(-60, 60, SQUARES)[:, None]) == []
 
 
-def test_those_beside_a_mixed_square_are_left_out_with_it() -> None:
-    wall = noise()
-    wall[:, 44, :10] += 10.0
-    number = np.arange(SQUARES)
-    assert named(wall, np.column_stack([number // 10 - 5, number % 10 - 5])) == [34, 43, 44, 45, 54]
-    assert named(wall, np.column_stack([number, number % 7])) == [44]  # those touch at corners
+def test_cells_beside_mixed_squares_are_left_out_with_them() -> None:
+    """A thing on the four cells of a square, X: squares of which it has two cells are mixed, too; of one not."""
+    wall = noise(squares=144)
+    wall[:, [65, 66, 77, 78], :10] += 10.0
+    number = np.arange(144)
+    left = named(wall, np.column_stack([number // 12 - 5, number % 12 - 5]))
+    picture = "".join("X" if cell in (65, 66, 77, 78) else "#" if cell in left else "." for cell in number)
+    assert [picture[start : start + 12] for start in range(24, 120, 12)] == [
+        "............",
+        ".....##.....",
+        "....####....",
+        "...##XX##...",
+        "...##XX##...",
+        "....####....",
+        ".....##.....",
+        "............",
+    ]
+
+
+@pytest.mark.parametrize("along", [0.0, 0.25, 0.5, 0.75])  # of a cell
+@pytest.mark.parametrize("up", [0.0, 0.5])
+def test_a_thing_is_found_wherever_the_cells_begin(along: float, up: float) -> None:
+    """A thing of two by two cells, of which 40 % come as echoes; squares side by side would miss it at some places."""
+    rng = np.random.default_rng(8)
+    at = rng.uniform(0, 20, size=(PASSES, 12_000, 2))
+    residuals = rng.normal(size=at.shape[:2])
+    thing = np.all((at > 9) & (at < 11), axis=2)
+    residuals[thing & (rng.uniform(size=thing.shape) < 0.4)] += 10.0
+    column, row = np.floor(at + np.array([along, up])).astype(int).transpose(2, 0, 1)
+    bins = np.clip(np.floor(MIDDLE + SIGMA * residuals).astype(int), 0, BINS - 1)
+    counts = np.zeros((PASSES, 21 * 21, BINS), dtype=np.int64)
+    np.add.at(counts, (np.arange(PASSES)[:, None], 21 * column + row, bins), 1)
+    number = np.arange(21 * 21)
+    left = np.isin(21 * column + row, mixed_cells(list(counts), np.column_stack([number // 21, number % 21])))
+    assert left[thing].all()
+    assert 16 < left.sum() / (PASSES * 12_000) * 400 < 36  # cells: the thing's four, and one or two beside them
 
 
 def test_amid_a_thing_soundings_are_off_to_both_sides() -> None:
-    """Its edge is at square 20: three squares beyond belong to it, one lies beside them. Noise alone begins none."""
+    """Its edge is at cell 20: squares up to six cells on belong to it, and a cell beside them; noise begins none."""
     wall = noise()
     wall[:, 20, :10] += 10.0
-    for both in (slice(21, 26), slice(60, 70)):
+    for both in (slice(21, 35), slice(60, 70)):
         wall[:, both, :10] += 10.0
         wall[:, both, 10:20] -= 10.0
     number = np.arange(SQUARES)
-    assert named(wall, np.column_stack([number, 0 * number])) == [19, 20, 21, 22, 23, 24]
+    assert named(wall, np.column_stack([number, 0 * number])) == list(range(18, 29))
 
 
 @pytest.mark.parametrize(("squares", "is_mixed"), [(45, True), (55, False)])

@@ -1,4 +1,4 @@
-"""Squares of walls: a sounding lies in the one that its ray meets, whatever its range says; and those are left out."""
+"""Cells of walls: a sounding lies in the one that its ray meets, whatever its range says; and those are left out."""
 
 from types import SimpleNamespace
 from typing import Any, cast
@@ -6,7 +6,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from pipeline.adjustment.face_squares import SIDE_M, OutsideSquares, codes_of
+from pipeline.adjustment.face_cells import CELL_M, OutsideCells, codes_of
 from pipeline.maths.adjustment.observed_surface import ObservedSurface
 
 NORMAL = np.array([-1.0, 0.0, 0.0])  # of walls at x = 0, seen from x < 0
@@ -33,17 +33,17 @@ def codes(place: list[list[float]], face: list[int]) -> np.ndarray:
 
 
 @pytest.mark.parametrize("beyond", [-0.3, 0.2])
-def test_a_sounding_lies_in_the_square_that_its_ray_meets(beyond: float) -> None:
-    """30 cm before the wall or 20 cm behind it, on a ray that goes down and to the side by more than a square."""
-    meets = np.array([0.0, 5.05 * SIDE_M, -6.95 * SIDE_M])
+def test_a_sounding_lies_in_the_cell_that_its_ray_meets(beyond: float) -> None:
+    """30 cm before the wall or 20 cm behind it, on a ray that goes down and to the side by more than a cell."""
+    meets = np.array([0.0, 10.05 * CELL_M, -13.95 * CELL_M])
     off = SONAR_M + (meets - SONAR_M) * (5 + beyond) / 5
     first, second, plain = codes([meets.tolist(), off.tolist(), [0.0, *off[1:]]], [0, 0, 0])
     assert first == second
     assert plain != first  # straight back to the wall it would be another
 
 
-def test_squares_are_told_apart_by_face_row_and_column() -> None:
-    side = SIDE_M
+def test_cells_are_told_apart_by_face_row_and_column() -> None:
+    side = CELL_M
     places = [[0, 0.1 * side, 0.1 * side], [0, 0.9 * side, 0.9 * side]]
     others = [[0, 1.1 * side, 0.1 * side], [0, 0.1 * side, 1.1 * side], [0, -0.1 * side, 0.1 * side], places[0]]
     found = codes([*places, *others], [0, 0, 0, 0, 0, 2])
@@ -51,12 +51,12 @@ def test_squares_are_told_apart_by_face_row_and_column() -> None:
     assert len(set(found.tolist())) == 5
 
 
-def test_soundings_in_the_squares_are_left_out() -> None:
+def test_soundings_in_the_cells_are_left_out() -> None:
     batch = {
         "place": np.array([[0, 0.1, -0.9], [0, 0.4, -0.9], [0, 0.1, -0.9], [-0.1, 0.1 * 4.9 / 5, -1 + 0.1 * 4.9 / 5]]),
         "face": np.array([0, 0, 1, 0]),
         "t_ns": np.arange(4),
     }
-    (square,) = codes([[0, 0.1, -0.9]], [0])
-    left = OutsideSquares(cast(Any, Model()), STATE, "mbes", np.array([square]))(batch)
+    (cell,) = codes([[0, 0.1, -0.9]], [0])
+    left = OutsideCells(cast(Any, Model()), STATE, "mbes", np.array([cell]))(batch)
     assert left["t_ns"].tolist() == [1, 2]
