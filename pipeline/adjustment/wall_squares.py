@@ -31,10 +31,10 @@ MERGED = 1_000_000  # codes of batches that wait, beyond twice those that are kn
 
 
 @dataclass(frozen=True)
-class Squares:
-    """Mixed squares of a face as a head of the sonar sees it.
+class MixedCells:
+    """Cells of the mixed squares of a face, and beside them, as a head of the sonar sees it.
 
-    code (c,): of their cells, as :func:`~pipeline.adjustment.face_cells.codes_of` gives it; points: soundings in them;
+    code (c,): as :func:`~pipeline.adjustment.face_cells.codes_of` gives it; points: soundings in them;
     share: of all on the face; low_m, high_m: heights above the water between which they lie.
     """
 
@@ -58,7 +58,7 @@ def adjust_clear_squares(
     passes: pd.DataFrame,
     settings: IterationSettings,
     gap_s: float,
-) -> tuple[MountAdjustment, Mapping[str, Stream], list[Squares]]:
+) -> tuple[MountAdjustment, Mapping[str, Stream], list[MixedCells]]:
     """Return the adjustment without the soundings in mixed squares, the points it has used, and the squares.
 
     Parameters
@@ -79,7 +79,7 @@ def adjust_clear_squares(
         return first, streams, []
     squares = mixed_squares(problem, first, streams, passes)
     if squares:
-        left = without_squares(problem, first, streams, squares)
+        left = without_cells(problem, first, streams, squares)
         adjustment = adjust_mount(problem, left, settings, gap_s)
         if not adjustment.solution.deficiency:
             return adjustment, left, squares
@@ -88,7 +88,7 @@ def adjust_clear_squares(
 
 def mixed_squares(
     problem: CalibrationProblem, adjustment: MountAdjustment, streams: Mapping[str, Stream], passes: pd.DataFrame
-) -> list[Squares]:
+) -> list[MixedCells]:
     """Return the mixed squares of all upright and sloping faces, by head and face.
 
     Parameters
@@ -102,7 +102,7 @@ def mixed_squares(
     passes : DataFrame
         Table passes.
     """
-    model, state, found = problem.model, adjustment.state, list[Squares]()
+    model, state, found = problem.model, adjustment.state, list[MixedCells]()
     times_ns = passes["start_ns"].to_numpy(), passes["end_ns"].to_numpy()
     for head in (name for name in streams if kind_of(name) == "mbes"):
         code, number = _merged(streams[head].fold(_counted, model, head, adjustment.values, times_ns))
@@ -114,12 +114,12 @@ def mixed_squares(
     return found
 
 
-def without_squares(
-    problem: CalibrationProblem, adjustment: MountAdjustment, streams: Mapping[str, Stream], squares: Iterable[Squares]
+def without_cells(
+    problem: CalibrationProblem, adjustment: MountAdjustment, streams: Mapping[str, Stream], left: Iterable[MixedCells]
 ) -> dict[str, Stream]:
-    """Return the streams without the soundings in these squares."""
+    """Return the streams without the soundings in these cells."""
     codes: dict[str, list[Integers]] = {}
-    for one in squares:
+    for one in left:
         codes.setdefault(one.head, []).append(one.code)
     return dict(streams) | {
         head: streams[head].changed(OutsideCells(problem.model, adjustment.state, head, np.concatenate(of_head)))
@@ -162,16 +162,16 @@ def _together(pieces: Sequence[tuple[Integers, Integers]]) -> tuple[Integers, In
 
 def _of_face(
     model: ObservationModel, state: State, seen: tuple[str, int], code: Integers, number: Integers
-) -> list[Squares]:
+) -> list[MixedCells]:
     """Return the mixed squares of a face as a head has ``seen`` it, from codes (n,) and their numbers; or nothing."""
     cells, row = np.unique(code // (PASSES * BINS), return_inverse=True)
     soundings, run = np.bincount(row, number).astype(np.int64), code // BINS % PASSES
     place = places_of(cells)
     squares, passes = OverlappingSquares.of(place), []
     for each in np.unique(run).tolist():
-        mine, count = run == each, np.zeros((len(cells), BINS), dtype=np.int64)
+        mine, count = run == each, np.zeros((len(cells) + 1, BINS), dtype=np.int32)
         count[row[mine], code[mine] % BINS] = number[mine]
-        passes.append(PassExcess.of(squares.sums(count)))
+        passes.append(PassExcess.of(squares, count))
     is_mixed = mixed(squares, soundings, passes)
     if not is_mixed.any():
         return []
@@ -180,4 +180,4 @@ def _of_face(
     off_m = surface.shift_m + model.height_of_face[seen[1]]
     z = corners @ surface.tangents[:, 2] + surface.centre_m[2] + off_m * surface.normal[2] - model.wet_heights_m[1]
     points = int(soundings[is_mixed].sum())
-    return [Squares(*seen, cells[is_mixed], points, points / soundings.sum(), float(z.min()), float(z.max()))]
+    return [MixedCells(*seen, cells[is_mixed], points, points / soundings.sum(), float(z.min()), float(z.max()))]

@@ -28,7 +28,7 @@ from pipeline.adjustment.face_errors import FinalSolution
 from pipeline.adjustment.iteration import MountAdjustment, adjust_mount
 from pipeline.adjustment.parameter_strengths import parameter_tests
 from pipeline.adjustment.problem import CalibrationProblem
-from pipeline.adjustment.wall_squares import Squares, adjust_clear_squares
+from pipeline.adjustment.wall_squares import MixedCells, adjust_clear_squares
 from pipeline.adjustment.wall_stripes import OutsideStripes, Stripe, profiles_by_height, stripes_off
 from pipeline.artefacts.catalogue.results import LEFT_OUT
 from pipeline.artefacts.streams import Stream
@@ -144,7 +144,7 @@ def adjust_true_faces(
     return adjustment, points, pd.DataFrame([vars(one) for one in found], columns=columns)
 
 
-def _of_squares(problem: CalibrationProblem, squares: Squares) -> LeftOut:
+def _of_squares(problem: CalibrationProblem, squares: MixedCells) -> LeftOut:
     family, place = _family(problem, squares.face), (squares.head, squares.low_m, squares.high_m)
     return LeftOut(family, "mixed", squares.points, *place, area_m2=squares.area_m2, share=squares.share)
 

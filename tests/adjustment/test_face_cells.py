@@ -6,7 +6,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from pipeline.adjustment.face_cells import CELL_M, OutsideCells, codes_of
+from pipeline.adjustment.face_cells import CELL_M, REACH, OutsideCells, codes_of, faces_of, places_of
 from pipeline.maths.adjustment.observed_surface import ObservedSurface
 
 NORMAL = np.array([-1.0, 0.0, 0.0])  # of walls at x = 0, seen from x < 0
@@ -49,6 +49,15 @@ def test_cells_are_told_apart_by_face_row_and_column() -> None:
     found = codes([*places, *others], [0, 0, 0, 0, 0, 2])
     assert found[0] == found[1]
     assert len(set(found.tolist())) == 5
+
+
+def test_codes_say_face_column_and_row() -> None:
+    """Columns of a wall that looks to -x count toward -y, its rows up; cells farther than 4 km away are the last."""
+    places = [[0, -0.5, 0.5], [0, 0.5, 3.5], [0, -7.5, -2.5], [0, REACH + 5, -REACH - 5], [0, -REACH - 5, REACH + 5]]
+    faces = [0, 2, 1, 1, 0]
+    found = codes((CELL_M * np.array(places)).tolist(), faces)
+    assert faces_of(found).tolist() == faces
+    assert places_of(found).tolist() == [[0, 0], [-1, 3], [7, -3], [-REACH, -REACH], [REACH - 1, REACH - 1]]
 
 
 def test_soundings_in_the_cells_are_left_out() -> None:

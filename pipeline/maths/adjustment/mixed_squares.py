@@ -2,7 +2,7 @@
 
 The beams of a sonar are wide. At the edge of a ladder, a fender, a rope or a ledge one echo comes from both it and the
 wall, and the bottom detection takes a place between them. Robust weights cut what lies far off, but not what lies near
-the wall: the rest is off to one side. In such a square, and in those beside it, no sounding is trusted.
+the wall: the rest is off to one side. In such a square, and in the cells beside it, no sounding is trusted.
 
 A square is compared with itself in one pass, not with the plane nor with other passes: its soundings lie about their
 median, wherever the wall stands. So a wall that is turned or bowed has no such squares, and passes that contradict one
@@ -12,45 +12,50 @@ standard deviation is (q₃ - q₁) / 1.349, as for normal errors, and the usual
 noise is off to both sides: the *excess* of a square is the number off on the one less that on the other.
 
 A wall is cut into cells of half a square's side, and every square of two by two cells is judged. Squares overlap, so it
-matters little where the cells begin: with squares side by side a ledge that lay across four of them was found in none,
-and two drawings of one dock left out 3 % of the soundings and 10 %.
+matters little where the cells begin: with squares side by side a ledge that lies across four of them is found in none.
 
 A square is mixed if its excess, of all passes together,
 
 * is a larger share of its soundings than usual, by a tenth, and certainly larger by the binomial distribution: all
-  squares of the face together have the chance 0.01 of one that is named wrongly, if soundings are independent;
-* is larger than 3 times the root of the number that are off, which is its standard deviation if each is off to either
-  side by chance. But soundings of a ping are not independent: so
+  squares of the face together have a chance of 0.01 at most of one that is named wrongly, if soundings are independent
+  and no part of the face is noisier;
+* is larger than 3.4 times the root of the number that are off, which is its standard deviation if each is off to either
+  side by chance, as in a noisier part. (By 3, four times as many squares would be named there, and they do grow: of
+  walls with four times the noise on two fifths, 9 % were left out, by 3.4 one hundredth.) But soundings of a ping
+  are not independent: so
 * most of the passes that see the square, and two at least, must have an excess to this side, beyond its own standard
   deviation. A thing stands there in every pass; a bad ping, a fish, an echo of the boat does not.
 
 Amid a thing an echo comes from anywhere between it and the wall, and soundings are off to both sides. So mixed squares
 grow: those one cell beside them that have a tenth more off than usual, to whatever side, belong to them, up to 6 cells
-away. All cells of these squares are mixed, and then those beside them, for a thing does not end where a square does.
+away. All cells of these squares are left out, and then those beside them, for a thing does not end where a square does.
 
 If all these cells hold more than half of the soundings of a face, no single thing explains them, and none is left out:
 the tests of noise and of residuals speak.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Counts = NDArray[np.integer[Any]]
 Flags = NDArray[np.bool_]
-FEWEST_SQUARES = 16  # of a face that is judged: each cell lies in four
+FEWEST_SQUARES = 25  # of a face that is judged: as many as hold one of four by four cells
 FEWEST_SOUNDINGS = 8  # of a square in a pass that is judged
 QUARTILES_APART = 1.349  # in standard deviations of normal errors
-OFF, CERTAIN = 4.0, 3.0  # usual standard deviations from the median; those of an excess by chance
+OFF, CERTAIN = 4.0, 3.4  # usual standard deviations from the median; those of an excess by chance
 LARGER_SHARE = 0.1  # than usual: of the excess of a mixed square; half of it in a pass that agrees
 LEAST_SHARE = 0.02  # of the excess of a usual square
 CHANCE = 0.01  # of all squares of a face together
 MOST = 0.5  # of a face's soundings
 OF_SQUARE = ((0, 0), (1, 0), (0, 1), (1, 1))  # its cells: columns and rows on
 BESIDE, GROWN = ((1, 0), (-1, 0), (0, 1), (0, -1)), 6  # columns and rows on; cells
+AT_A_TIME = 1 << 13  # squares whose soundings are counted by bin
 
 
 @dataclass(frozen=True)
@@ -67,18 +72,16 @@ class OverlappingSquares:
 
     @classmethod
     def of(cls, place: Integers) -> "OverlappingSquares":
-        """Return the squares of cells at columns and rows (c, 2)."""
+        """Return the squares of cells at columns and rows (c, 2), which ascend."""
         corner = np.unique(np.concatenate([place - on for on in OF_SQUARE]), axis=0)
-        code = _code(place, corner)
-        order = np.argsort(code)
-        wanted = _code(corner[:, None] + np.array(OF_SQUARE), corner)
-        nearest = order[np.minimum(np.searchsorted(code, wanted, sorter=order), len(order) - 1)]
+        code, wanted = _code(place, corner), _code(corner[:, None] + np.array(OF_SQUARE), corner)
+        nearest = np.minimum(np.searchsorted(code, wanted), len(code) - 1)
         return cls(place, corner, np.where(code[nearest] == wanted, nearest, len(place)))
 
-    def sums(self, of_cells: Integers) -> Integers:
-        """Return the sums (s, ...) over the squares of numbers (c, ...) of the cells."""
-        padded = np.concatenate([of_cells, np.zeros_like(of_cells[:1])])
-        return np.asarray(sum(padded[of_corner] for of_corner in self.cells.T))
+    def sums(self, of_cells: Counts) -> Iterator[Integers]:
+        """Yield the sums over the squares of numbers (c + 1, b) of the cells and of none, for so many at a time."""
+        for start in range(0, len(self.cells), AT_A_TIME):
+            yield np.asarray(sum(of_cells[of_corner] for of_corner in self.cells[start : start + AT_A_TIME].T))
 
     def cells_of(self, found: Flags) -> Flags:
         """Return which cells (c,) some of the squares (s,) hold."""
@@ -97,15 +100,19 @@ class PassExcess:
     excess: Integers
 
     @classmethod
-    def of(cls, count: Integers) -> "PassExcess":
-        """Return the excess from the numbers of soundings (s, b) by square and bin of their residuals."""
-        number = count.sum(axis=1)
-        first, median, third = (_quantiles(count, share) for share in (0.25, 0.5, 0.75))
-        within = (first >= 1) & (third <= count.shape[1] - 1)  # those in the end bins lie anywhere beyond
+    def of(cls, squares: OverlappingSquares, of_cells: Counts) -> "PassExcess":
+        """Return the excess from the numbers of soundings (c + 1, b) by cell and bin; the last row has none."""
+        number = np.concatenate([count.sum(axis=1) for count in squares.sums(of_cells)])
+        first, median, third = np.concatenate([_quartiles(count) for count in squares.sums(of_cells)], axis=1)
+        within = (first >= 1) & (third <= of_cells.shape[1] - 1)  # those in the end bins lie anywhere beyond
         number = np.where(within & (number >= FEWEST_SOUNDINGS), number, 0)
         usual = max(_weighted_median(third - first, number) / QUARTILES_APART, 0.5)
-        off = np.arange(count.shape[1]) + 0.5 - median[:, None]
-        above, below = (np.sum(count * (side * off > OFF * usual), axis=1) * (number > 0) for side in (1, -1))
+        middle, start, sides = np.arange(of_cells.shape[1]) + 0.5, 0, []
+        for count in squares.sums(of_cells):
+            off = middle - median[start : start + len(count), None]
+            sides.append([np.sum(count, axis=1, where=side * off > OFF * usual) for side in (1, -1)])
+            start += len(count)
+        above, below = np.concatenate(sides, axis=1) * (number > 0)
         return cls(number, above + below, above - below)
 
 
@@ -173,10 +180,12 @@ def _weighted_median(value: Array, weight: Integers) -> float:
     return float(value[order][np.searchsorted(below, below[-1] / 2)]) if len(below) and below[-1] else 0.0
 
 
-def _quantiles(count: Integers, share: float) -> Array:
-    """Return the places (s,), in bins, below which this share of each square's soundings lies; zero without any."""
-    below = np.cumsum(count, axis=1)
-    wanted = share * below[:, -1]
-    bin_, rows = np.argmax(below >= wanted[:, None], axis=1), np.arange(len(count))
-    within = count[rows, bin_]
-    return np.asarray(bin_ + (wanted - below[rows, bin_] + within) / np.maximum(within, 1))
+def _quartiles(count: Integers) -> Array:
+    """Return the places (3, s), in bins, of the quartiles of each square's soundings (s, b); zero without any."""
+    below, rows, places = np.cumsum(count, axis=1), np.arange(len(count)), []
+    for share in (0.25, 0.5, 0.75):
+        wanted = share * below[:, -1]
+        bin_ = np.argmax(below >= wanted[:, None], axis=1)
+        within = count[rows, bin_]
+        places.append(bin_ + (wanted - below[rows, bin_] + within) / np.maximum(within, 1))
+    return np.array(places)
