@@ -40,20 +40,21 @@ FIRST_SEED = 90_000
 SAME_DEG, SAME_M = 1.0, 0.05  # a drawn face within these of a found plane lies in it
 HEAD = """# Found planes against drawn ones
 
-Made by `python -m tools.found_and_drawn --sessions {sessions}`. In each session `kind: found` finds the target in
-the laser's points; then the session is calibrated again on the drawn target, with the same `as_built`. All
+Made by `python -m tools.found_and_drawn --only TARGET --sessions NUMBER`. In each session `kind: found` finds the
+target in the laser's points; then the session is calibrated again on the drawn target, with the same `as_built`. All
 errors are drawn by their sigmas, as in [places](places.md). In the first columns the values on the found target less
 those on the drawn one, RMS in total sigmas of the former.
 
-| target | {names} | all | largest | total σ found ÷ drawn, largest | mean NSE found, drawn | a face left out: largest |
-|---{rules}|---|---|---|---|---|
+| target | sessions | {names} | all | largest | σ found ÷ drawn, largest | mean NSE found, drawn | a face left out |
+|---|---{rules}|---|---|---|---|---|
 """
 FOOT = """
 Of the drawn target the sonar sees the faces that are found: the wall and both returns of the dock, not its ledges; both
 sides of the caisson's corner, not the footing; of the patent's target the fronts of the blocks, and the wall between
 them. Found planes that are not drawn, such as the wall behind the patent's target, are struck. Last column: sessions
 in which the soundings on a found face were left out, because others contradicted them, and their largest difference. A
-drawn face is never left out: these sessions are not in the other columns.
+drawn face is never left out: these sessions are not in the other columns. After ±: standard deviation of the figure,
+by the spread of the sessions.
 """
 
 
@@ -154,13 +155,15 @@ def page(table: pd.DataFrame) -> str:
         worst, out = int(np.argmax(ratios)), every[every["left"] > 0]
         largest = np.abs(out[[f"apart_{name}" for name in NAMES]].to_numpy(float)).max(initial=0.0)
         left = f"{len(out)}: {largest:.1f}" if len(out) else "0"
+        squares = (apart**2).mean(axis=1)
+        all_ = float(np.sqrt(squares.mean()))
+        sigma = float(squares.std(ddof=1)) / (2 * all_ * np.sqrt(len(squares)))
         lines.append(
-            f"| {kind} | {' | '.join(f'{size:.2f}' for size in of_name)} | {np.sqrt((apart**2).mean()):.2f} | "
+            f"| {kind} | {len(every)} | {' | '.join(f'{size:.2f}' for size in of_name)} | {all_:.2f} ± {sigma:.2f} | "
             f"{np.abs(apart).max():.1f} | {ratios[worst]:.2f} ({NAMES[worst]}) | "
             f"{rows['nse_total'].mean():.1f}, {rows['drawn_nse_total'].mean():.1f} | {left} |\n"
         )
-    sessions = int(table.groupby("place").size().max())
-    return HEAD.format(sessions=sessions, names=" | ".join(NAMES), rules="|---" * len(NAMES)) + "".join(lines) + FOOT
+    return HEAD.format(names=" | ".join(NAMES), rules="|---" * len(NAMES)) + "".join(lines) + FOOT
 
 
 def main() -> None:
