@@ -37,6 +37,12 @@ def test_a_footing_is_cut_to_the_lower_end() -> None:
     assert found.off_m == pytest.approx(0.05, abs=0.002)
 
 
+def test_a_footing_of_two_fifths_of_the_wall_is_cut() -> None:
+    (found,) = stripes(dict.fromkeys(range(-40, -24), 0.13))
+    assert (found.low_m, found.points) == (-np.inf, 1600)
+    assert found.high_m == pytest.approx(-24 * BIN_M + BESIDE_M)
+
+
 def test_a_ledge_amid_the_wall_is_cut_alone() -> None:
     (found,) = stripes(dict.fromkeys(range(-20, -17), -0.03))
     assert (found.low_m, found.high_m) == pytest.approx((-20 * BIN_M - BESIDE_M, -17 * BIN_M + BESIDE_M))
@@ -97,11 +103,12 @@ def test_heights_of_a_rough_wall_may_be_off_by_as_much_as_they_scatter() -> None
     assert stripes_of_face(("mbes", 2), profile(rough | {-20: 0.05}), (TOLERANCE_M, 0.02), (0.0, 4.0)) == []
 
 
-def test_the_robust_line_is_that_of_most_heights() -> None:
+@pytest.mark.parametrize(("wrong", "off"), [(10, 7.0), (18, 7.0), (18, 0.05), (18, -0.3)])
+def test_the_robust_line_is_that_of_most_heights(wrong: int, off: float) -> None:
     place = np.arange(40.0)
     value = 0.3 * place - 2.0
-    value[:10] += 7.0
-    np.testing.assert_allclose(off_line(place, value), np.where(place < 10, 7.0, 0.0), atol=1e-9)
+    value[:wrong] += off
+    np.testing.assert_allclose(off_line(place, value), np.where(place < wrong, off, 0.0), atol=1e-9)
 
 
 WALL = SimpleNamespace(normal=np.array([-1.0, 0.0, 0.0]), distance_m=0.0)  # at x = 0, seen from x < 0

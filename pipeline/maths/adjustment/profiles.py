@@ -1,8 +1,9 @@
 """Profiles of mean residuals over height: a line that a part of the heights cannot move, and the scatter about it.
 
-The line is that of Theil 1950, "A rank-invariant method of linear and polynomial regression analysis": its slope is the
-median of the slopes of all pairs, its place the median of what remains. Up to 29 % of the heights may be wrong without
-moving it far. The scatter is the median absolute deviation times 1.4826, the standard deviation of normal errors.
+The line is that of Siegel 1982, "Robust regression using repeated medians", Biometrika 69, p. 242: its slope is the
+median over the heights of each one's median slope to all others, its place the median of what remains. Up to half of
+the heights may be wrong without moving it far. (Theil's, the median of the slopes of all pairs, bears 29 %: a footing
+of a third of a wall's heights was taken for a bow of the wall.) The scatter is the median absolute deviation times 1.4826, the standard deviation of normal errors.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -28,9 +29,10 @@ def profiles_of(pieces: Iterable[ResidualSums]) -> Profiles:
 
 
 def off_line(place: Array, value: Array) -> Array:
-    """Return the values (n,) at places (n,) less the robust line through them."""
-    i, j = np.triu_indices(len(place), 1)
-    slope = np.median((value[j] - value[i]) / (place[j] - place[i]))
+    """Return the values (n,) at places (n,), n > 1 and no two alike, less the robust line through them."""
+    apart = place - place[:, None]
+    np.fill_diagonal(apart, np.nan)
+    slope = np.median(np.nanmedian((value - value[:, None]) / apart, axis=1))
     return np.asarray(value - slope * place - np.median(value - slope * place))
 
 
