@@ -3,7 +3,8 @@
 The line is that of Siegel 1982, "Robust regression using repeated medians", Biometrika 69, p. 242: its slope is the
 median over the heights of each one's median slope to all others, its place the median of what remains. Up to half of
 the heights may be wrong without moving it far. (Theil's, the median of the slopes of all pairs, bears 29 %: a footing
-of a third of a wall's heights was taken for a bow of the wall.) The scatter is the median absolute deviation times 1.4826, the standard deviation of normal errors.
+of a third of a wall's heights was taken for a bow of the wall.) The scatter is the median absolute deviation times
+1.4826, the standard deviation of normal errors.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
